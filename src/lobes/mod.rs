@@ -1,0 +1,212 @@
+//! The lobes: one file each, one line each in the list below, and the trait they fulfil.
+//!
+//! In: a parameter block, ωo in the lobe's own frame (z = its normal), an albedo curve where the lobe asks for one.
+//! Out: f, pdf, samples, albedo and – required – a bound on the albedo. A lobe never sees other lobes, weights,
+//! layers or world space.
+
+pub mod registry;
+
+mod diffuse;
+mod emission;
+mod oren_nayar;
+mod sheen;
+mod translucent;
+mod transparent;
+
+use crate::albedo::{AlbedoCurve, CurveSpec};
+use crate::optics::{Lift, Real, V3};
+use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
+
+/// A value per colour channel.
+pub type Rgb<R> = [R; 3];
+/// A colour as scripts hold it: linear RGB.
+pub type Rgb32 = [f32; 3];
+
+/// One model of scattering, prepared for one ωo.
+///
+/// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
+/// type parameter is what the lobe was prepared in; `f`, `pdf` and `albedo_bound` may be evaluated over lanes.
+pub trait Lobe<S: Real>: Sized + Copy {
+    type Params: ClosureParams;
+
+    /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
+    fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
+        let _ = values;
+        None
+    }
+
+    /// A color that multiplies the lobe and stays out of its albedo curve.
+    fn weight(params: &Self::Params) -> Rgb32 {
+        let _ = params;
+        [1.0; 3]
+    }
+
+    /// Whether this instance is reciprocal.
+    fn reciprocal(params: &Self::Params) -> bool {
+        let _ = params;
+        Self::Params::SPEC.reciprocal
+    }
+
+    /// Prepares everything that depends on the parameters and on ωo alone.
+    fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self;
+
+    /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
+
+    /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L;
+
+    /// A direction for two uniform numbers in [0, 1).
+    fn sample(&self, u: [S; 2]) -> V3<S>;
+
+    /// Best estimate of E_view(ω) = ∫ f(ω, ωi)·|cos θi| dωi.
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S>;
+
+    /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
+
+    /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
+    fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
+        None
+    }
+}
+
+macro_rules! lobes {
+    ($( $module:ident :: $Lobe:ident ),* $(,)?) => {
+        /// Names one of the registered lobes.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[repr(u16)]
+        pub enum LobeKind { $( $Lobe ),* }
+
+        impl LobeKind {
+            /// Every lobe there is.
+            pub const ALL: &[LobeKind] = &[ $( LobeKind::$Lobe ),* ];
+
+            /// The lobe's declaration.
+            pub fn spec(self) -> &'static LobeSpec {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC ),* }
+            }
+
+            /// The albedo table a parameter block needs (`None` entries: known only when shading).
+            pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
+            }
+
+            /// Whether a lobe with these parameter values is reciprocal.
+            pub fn reciprocal(self, values: &[f32]) -> bool {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
+                } ),* }
+            }
+
+            /// The color that multiplies a lobe with these parameter values.
+            pub fn weight(self, values: &[f32]) -> Rgb32 {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::weight(&params)
+                } ),* }
+            }
+        }
+
+        /// A prepared lobe of any kind: the one place that dispatches.
+        #[derive(Clone, Copy, Debug)]
+        pub enum AnyLobe<S: Real> { $( $Lobe($module::$Lobe<S>) ),* }
+
+        impl<S: Real> AnyLobe<S> {
+            /// See [`Lobe::new`]; `values` is the lobe's parameter block.
+            pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+                match kind { $( LobeKind::$Lobe => AnyLobe::$Lobe(
+                    <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)) ),* }
+            }
+            /// See [`Lobe::f`].
+            #[inline]
+            pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve) ),* }
+            }
+            /// See [`Lobe::pdf`].
+            #[inline]
+            pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi) ),* }
+            }
+            /// See [`Lobe::sample`].
+            #[inline]
+            pub fn sample(&self, u: [S; 2]) -> V3<S> {
+                match self { $( AnyLobe::$Lobe(l) => l.sample(u) ),* }
+            }
+            /// See [`Lobe::albedo`].
+            #[inline]
+            pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve) ),* }
+            }
+            /// See [`Lobe::albedo_bound`].
+            #[inline]
+            pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve) ),* }
+            }
+            /// See [`Lobe::delta`].
+            #[inline]
+            pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
+                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l) ),* }
+            }
+        }
+    };
+}
+
+lobes! {
+    diffuse::Diffuse,
+    translucent::Translucent,
+    transparent::Transparent,
+    emission::Emission,
+    oren_nayar::OrenNayar,
+    sheen::Sheen,
+}
+
+impl LobeKind {
+    pub fn class(self) -> LobeClass {
+        self.spec().class
+    }
+
+    /// The lobe called `name`.
+    pub fn by_name(name: &str) -> Option<LobeKind> {
+        LobeKind::ALL.iter().copied().find(|k| k.spec().name == name)
+    }
+}
+
+/// Layers one closure over another.
+const LAYER: Form = Form {
+    name: "layer",
+    params: &[
+        ParamSpec {
+            name: "top",
+            ty: ParamTy::Closure,
+            keyword: false,
+            default: &[],
+            min: f32::NEG_INFINITY,
+            max: f32::INFINITY,
+            options: &[],
+            doc: "What light meets first.",
+        },
+        ParamSpec {
+            name: "base",
+            ty: ParamTy::Closure,
+            keyword: false,
+            default: &[],
+            min: f32::NEG_INFINITY,
+            max: f32::INFINITY,
+            options: &[],
+            doc: "What lies below; scaled by what the top passes on.",
+        },
+    ],
+    doc: "`top` over `base`: the base is scaled by min(α(ωo), α(ωi)), α = 1 − the albedo bound of the top.",
+    source: "Conty & Kulla 2017, §5, after Kelemen & Szirmay-Kalos 2001",
+    reciprocal: true,
+    build: Build::Layer,
+};
+
+/// Every way to call a closure: each lobe under its own name, then wrappers and aliases. Several forms may share a
+/// name; their parameter types tell them apart.
+pub fn forms() -> impl Iterator<Item = Form> {
+    let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
+    lobes.chain([LAYER]).chain(sheen::FORMS.iter().copied())
+}

@@ -1,0 +1,54 @@
+//! Lambertian reflection.
+
+use super::registry::closure;
+use super::{Lobe, Rgb};
+use crate::albedo::AlbedoCurve;
+use crate::optics::{Lift, Real, V3, sampling};
+
+closure! {
+    /// Lambertian reflection: f = 1/π where ωo and ωi lie on the normal's side. Albedo 1 on that side, 0 below.
+    closure "oren_nayar" as OrenNayarParams {
+        /// Shading normal.
+        normal N;
+        /// Standard deviation of the facets' slope angle, in radians.
+        float sigma = 0.3, in (0.0, 1.5707964);
+    }
+    source: "Lambert 1760; OSL specification, diffuse()",
+    reciprocal: true,
+    class: Scatter,
+}
+
+/// See [`OrenNayarParams`].
+#[derive(Clone, Copy, Debug)]
+pub struct OrenNayar<S> {
+    /// 1/π if ωo is on the normal's side, else 0.
+    value: S,
+}
+
+impl<S: Real> Lobe<S> for OrenNayar<S> {
+    type Params = OrenNayarParams;
+
+    fn new(_: &OrenNayarParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+        OrenNayar { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) }
+    }
+
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        [L::select(wi.z.gt(L::zero()), L::lift(self.value), L::zero()); 3]
+    }
+
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        sampling::cosine_hemisphere_pdf(wi.z)
+    }
+
+    fn sample(&self, u: [S; 2]) -> V3<S> {
+        sampling::cosine_hemisphere(u)
+    }
+
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+        [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
+    }
+
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        [L::select(w.z.gt(L::zero()), L::one(), L::zero()); 3]
+    }
+}

@@ -1,0 +1,332 @@
+//! What a closure is called, what it takes, and what it becomes: the declarations every other part reads.
+//!
+//! A lobe states its parameters once, with [`closure!`](crate::lobes::registry::closure); the language takes the
+//! signature from it, `overcoat lobes` the documentation, [`crate::closure`] the layout of the values, the laws in
+//! `tests/` the ranges to try. A [`Form`] is one way to call a closure from a script: a lobe's own signature, or an
+//! alias or wrapper that expands to it.
+
+use super::LobeKind;
+
+/// The type of a closure parameter, as a script writes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParamTy {
+    Float,
+    Int,
+    Color,
+    Vector,
+    Normal,
+    /// One of [`ParamSpec::options`]; stored as its index.
+    String,
+    /// `closure color`: only in forms that wrap or layer, never a lobe's own parameter.
+    Closure,
+}
+
+impl ParamTy {
+    /// How many f32 slots a value takes in a [`ClosureTree`](crate::closure::ClosureTree).
+    pub const fn slots(self) -> usize {
+        match self {
+            ParamTy::Float | ParamTy::Int | ParamTy::String => 1,
+            ParamTy::Color | ParamTy::Vector | ParamTy::Normal => 3,
+            ParamTy::Closure => 0,
+        }
+    }
+
+    /// The type's name in the language.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ParamTy::Float => "float",
+            ParamTy::Int => "int",
+            ParamTy::Color => "color",
+            ParamTy::Vector => "vector",
+            ParamTy::Normal => "normal",
+            ParamTy::String => "string",
+            ParamTy::Closure => "closure color",
+        }
+    }
+}
+
+/// One declared parameter of a closure.
+#[derive(Clone, Copy, Debug)]
+pub struct ParamSpec {
+    pub name: &'static str,
+    pub ty: ParamTy,
+    /// Given as `"name", value` after the positional arguments, and then optional.
+    pub keyword: bool,
+    /// Slot values when a keyword is left out, and the documented typical value of a positional parameter. Empty for
+    /// closures, and for normals and vectors, whose default comes from the shading point.
+    pub default: &'static [f32],
+    /// Values are clamped to this range, per channel, when a lobe is built. Infinite where there is no limit.
+    pub min: f32,
+    pub max: f32,
+    /// The words a string parameter may be.
+    pub options: &'static [&'static str],
+    pub doc: &'static str,
+}
+
+impl ParamSpec {
+    /// Clamps one slot value to the declared range; NaN becomes the default (or the lower end without one).
+    pub fn clamp(&self, slot: usize, value: f32) -> f32 {
+        if value.is_nan() {
+            return self.default.get(slot).copied().unwrap_or(if self.min.is_finite() { self.min } else { 0.0 });
+        }
+        value.clamp(self.min, self.max)
+    }
+}
+
+/// A lobe's declaration.
+#[derive(Debug)]
+pub struct LobeSpec {
+    pub name: &'static str,
+    pub params: &'static [ParamSpec],
+    pub doc: &'static str,
+    /// Paper and equation.
+    pub source: &'static str,
+    /// Whether f(ωo, ωi) = f(ωi, ωo) at the default parameters.
+    pub reciprocal: bool,
+    pub class: LobeClass,
+}
+
+impl LobeSpec {
+    /// Number of f32 slots of a parameter block.
+    pub fn slot_count(&self) -> usize {
+        self.params.iter().map(|p| p.ty.slots()).sum()
+    }
+
+    /// The first slot of the parameter called `name`.
+    pub fn slot_of(&self, name: &str) -> Option<usize> {
+        let mut at = 0;
+        for p in self.params {
+            if p.name == name {
+                return Some(at);
+            }
+            at += p.ty.slots();
+        }
+        None
+    }
+}
+
+/// How a lobe takes part in a BSDF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LobeClass {
+    /// Has a density over directions.
+    Scatter,
+    /// Sends all it scatters into one direction.
+    Delta,
+    /// Adds light of its own.
+    Emission,
+}
+
+/// Where a lobe's slot values come from when a script calls a [`Form`].
+#[derive(Clone, Copy, Debug)]
+pub enum SlotSource {
+    /// The form's parameter with this index.
+    Param(usize),
+    /// Fixed by the form.
+    Const(&'static [f32]),
+}
+
+/// What calling a [`Form`] builds.
+#[derive(Clone, Copy, Debug)]
+pub enum Build {
+    /// A lobe; one source per lobe parameter, in the lobe's order; none at all means the form's parameters are the
+    /// lobe's.
+    Lobe { kind: LobeKind, args: &'static [SlotSource] },
+    /// `layer(weight * lobe, base)`: a lobe, tinted by the color parameter `weight`, over the closure parameter `base`.
+    Wrap { kind: LobeKind, args: &'static [SlotSource], weight: usize, base: usize },
+    /// `layer(top, base)` of the closure parameters 0 and 1.
+    Layer,
+}
+
+/// One callable signature.
+#[derive(Clone, Copy, Debug)]
+pub struct Form {
+    pub name: &'static str,
+    pub params: &'static [ParamSpec],
+    pub doc: &'static str,
+    pub source: &'static str,
+    pub reciprocal: bool,
+    pub build: Build,
+}
+
+impl Form {
+    /// The form that calls a lobe by its own name and parameters.
+    pub const fn of_lobe(kind: LobeKind, spec: &'static LobeSpec) -> Form {
+        Form {
+            name: spec.name,
+            params: spec.params,
+            doc: spec.doc,
+            source: spec.source,
+            reciprocal: spec.reciprocal,
+            build: Build::Lobe { kind, args: &[] },
+        }
+    }
+
+    pub fn positional(&self) -> impl Iterator<Item = &'static ParamSpec> {
+        self.params.iter().filter(|p| !p.keyword)
+    }
+
+    pub fn keywords(&self) -> impl Iterator<Item = &'static ParamSpec> {
+        self.params.iter().filter(|p| p.keyword)
+    }
+
+    /// As a script would declare it: `sheen(closure color base, normal N, …, ["softening", int])`.
+    pub fn signature(&self) -> String {
+        let positional = self.positional().map(|p| format!("{} {}", p.ty.name(), p.name));
+        let keywords = self.keywords().map(|p| format!("[\"{}\", {}]", p.name, p.ty.name()));
+        format!("{}({})", self.name, positional.chain(keywords).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// A parameter block read from slots: implemented by [`closure!`](crate::lobes::registry::closure).
+pub trait ClosureParams: Sized + Copy {
+    const SPEC: &'static LobeSpec;
+    /// Reads the block; every value is clamped to its declared range.
+    fn from_slots(slots: &[f32]) -> Self;
+}
+
+/// A value that slots hold.
+pub(crate) trait SlotValue: Sized {
+    fn read(spec: &ParamSpec, slots: &[f32]) -> Self;
+}
+
+impl SlotValue for f32 {
+    fn read(spec: &ParamSpec, slots: &[f32]) -> f32 {
+        spec.clamp(0, slots[0])
+    }
+}
+
+impl SlotValue for [f32; 3] {
+    fn read(spec: &ParamSpec, slots: &[f32]) -> [f32; 3] {
+        [0, 1, 2].map(|i| spec.clamp(i, slots[i]))
+    }
+}
+
+/// Ints and string options.
+impl SlotValue for u32 {
+    fn read(spec: &ParamSpec, slots: &[f32]) -> u32 {
+        spec.clamp(0, slots[0]) as u32
+    }
+}
+
+/// Declares a lobe's parameters. Each line is `type name = default, in (min, max);`, a keyword parameter starts with
+/// `keyword`, a string lists its options with `of [..]`; the `///` lines are the documentation users see.
+macro_rules! closure {
+    (
+        $(#[doc = $doc:literal])*
+        closure $name:literal as $Params:ident {
+            $( $(#[doc = $pdoc:literal])* $( @ $kw:ident )? $ty:ident $p:ident $(= $default:expr)? $(, in ($lo:expr, $hi:expr))? $(, of [$($opt:literal),*])? ; )*
+        }
+        source: $source:literal,
+        reciprocal: $rec:literal,
+        class: $class:ident,
+    ) => {
+        $(#[doc = $doc])*
+        #[derive(Clone, Copy, Debug)]
+        #[allow(non_snake_case)]
+        pub struct $Params { $( $(#[doc = $pdoc])* pub $p: $crate::lobes::registry::rust_type!($ty), )* }
+
+        impl $crate::lobes::registry::ClosureParams for $Params {
+            const SPEC: &'static $crate::lobes::registry::LobeSpec = &$crate::lobes::registry::LobeSpec {
+                name: $name,
+                params: &[ $( $crate::lobes::registry::ParamSpec {
+                    name: stringify!($p),
+                    ty: $crate::lobes::registry::param_ty!($ty),
+                    keyword: $crate::lobes::registry::is_keyword!($($kw)?),
+                    default: $crate::lobes::registry::default_slots!($ty $($default)?),
+                    min: $crate::lobes::registry::or_else!($($lo)?, f32::NEG_INFINITY),
+                    max: $crate::lobes::registry::or_else!($($hi)?, f32::INFINITY),
+                    options: &[$($($opt),*)?],
+                    doc: concat!($($pdoc, "\n"),*),
+                } ),* ],
+                doc: concat!($($doc, "\n"),*),
+                source: $source,
+                reciprocal: $rec,
+                class: $crate::lobes::registry::LobeClass::$class,
+            };
+
+            #[allow(unused_assignments, unused_variables, unused_mut)]
+            fn from_slots(slots: &[f32]) -> Self {
+                let mut at = 0;
+                let mut index = 0;
+                $(
+                    let spec = &Self::SPEC.params[index];
+                    let $p = $crate::lobes::registry::SlotValue::read(spec, &slots[at..]);
+                    at += spec.ty.slots();
+                    index += 1;
+                )*
+                $Params { $($p),* }
+            }
+        }
+    };
+}
+
+macro_rules! rust_type {
+    (float) => {
+        f32
+    };
+    (int) => {
+        u32
+    };
+    (string) => {
+        u32
+    };
+    ($other:ident) => {
+        [f32; 3]
+    };
+}
+
+macro_rules! param_ty {
+    (float) => {
+        $crate::lobes::registry::ParamTy::Float
+    };
+    (int) => {
+        $crate::lobes::registry::ParamTy::Int
+    };
+    (string) => {
+        $crate::lobes::registry::ParamTy::String
+    };
+    (color) => {
+        $crate::lobes::registry::ParamTy::Color
+    };
+    (vector) => {
+        $crate::lobes::registry::ParamTy::Vector
+    };
+    (normal) => {
+        $crate::lobes::registry::ParamTy::Normal
+    };
+}
+
+macro_rules! is_keyword {
+    () => {
+        false
+    };
+    (keyword) => {
+        true
+    };
+}
+
+macro_rules! default_slots {
+    ($ty:ident) => {
+        &[]
+    };
+    (color $e:expr) => {
+        &$e
+    };
+    (vector $e:expr) => {
+        &$e
+    };
+    ($ty:ident $e:expr) => {
+        &[$e]
+    };
+}
+
+macro_rules! or_else {
+    (, $d:expr) => {
+        $d
+    };
+    ($e:expr, $d:expr) => {
+        $e
+    };
+}
+
+pub(crate) use {closure, default_slots, is_keyword, or_else, param_ty, rust_type};

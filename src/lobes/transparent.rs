@@ -1,0 +1,52 @@
+//! Light that passes straight through.
+
+use super::registry::closure;
+use super::{Lobe, Rgb};
+use crate::albedo::AlbedoCurve;
+use crate::optics::{Lift, Real, V3};
+
+closure! {
+    /// Light passes straight through, unbent: a delta lobe in the direction −ωo that transmits everything.
+    closure "transparent" as TransparentParams {}
+    source: "OSL specification, transparent()",
+    reciprocal: true,
+    class: Delta,
+}
+
+/// See [`TransparentParams`].
+#[derive(Clone, Copy, Debug)]
+pub struct Transparent<S> {
+    wo: V3<S>,
+}
+
+impl<S: Real> Lobe<S> for Transparent<S> {
+    type Params = TransparentParams;
+
+    fn new(_: &TransparentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+        Transparent { wo }
+    }
+
+    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        [L::zero(); 3]
+    }
+
+    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+        L::zero()
+    }
+
+    fn sample(&self, _: [S; 2]) -> V3<S> {
+        -self.wo
+    }
+
+    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+        [S::one(); 3]
+    }
+
+    fn albedo_bound<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        [L::one(); 3]
+    }
+
+    fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
+        Some((-self.wo, [S::one(); 3]))
+    }
+}

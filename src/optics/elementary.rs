@@ -1,0 +1,94 @@
+//! exp, ln, sin, cos and atan2 in single precision, as plain arithmetic without branches or tables.
+//!
+//! One text serves `f32` and the lanes: the compiler turns a loop over it into vector code. Reductions follow Cody &
+//! Waite; the polynomials are minimax fits of the usual degrees (Moshier's Cephes). Errors, measured over every
+//! exponent in `tests/numbers.rs`: exp and ln 2 ulp, sin and cos 1.5e-7 absolute for |x| ≤ 8π, atan2 3e-7 absolute.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// eˣ. 0 below −87.3 (no denormals), +∞ above 88.7; NaN stays NaN.
+#[inline(always)]
+pub fn exp(x: f32) -> f32 {
+    // x = n·ln 2 + r, |r| ≤ ½ ln 2; adding and subtracting 1.5·2²³ rounds to the nearest integer.
+    const MAGIC: f32 = 12_582_912.0;
+    let clamped = x.clamp(-87.5, 89.0);
+    let shifted = clamped * std::f32::consts::LOG2_E + MAGIC;
+    let n = shifted - MAGIC;
+    let r = clamped - n * 0.693_359_375 + n * 2.121_944_4e-4;
+    let mut p = 1.987_569_2e-4_f32;
+    p = p * r + 1.398_199_9e-3;
+    p = p * r + 8.333_452e-3;
+    p = p * r + 4.166_579_6e-2;
+    p = p * r + 1.666_666_5e-1;
+    p = p * r + 5.000_000_3e-1;
+    let y = p * r * r + r + 1.0;
+    // Scale by 2ⁿ in two halves: n reaches 128, whose bit pattern is infinity.
+    let whole = n as i32;
+    let half = whole >> 1;
+    let y = y * pow2(half) * pow2(whole - half);
+    let y = if x < -87.3 { 0.0 } else { y };
+    if x > 88.722_84 { f32::INFINITY } else { y }
+}
+
+/// Natural logarithm. Below the smallest normal number, and for 0 and negative numbers, that number's logarithm.
+#[inline(always)]
+pub fn ln(x: f32) -> f32 {
+    let x = x.max(f32::MIN_POSITIVE);
+    let bits = x.to_bits();
+    // Mantissa in [√½, √2).
+    let shifted = bits.wrapping_sub(0x3f35_04f3);
+    let e = (shifted as i32 >> 23) as f32;
+    let m = f32::from_bits((shifted & 0x007f_ffff).wrapping_add(0x3f35_04f3)) - 1.0;
+    let z = m * m;
+    let mut p = 7.037_683_6e-2_f32;
+    p = p * m - 1.151_461e-1;
+    p = p * m + 1.167_699_9e-1;
+    p = p * m - 1.242_014_1e-1;
+    p = p * m + 1.424_932_3e-1;
+    p = p * m - 1.666_805_7e-1;
+    p = p * m + 2.000_071_5e-1;
+    p = p * m - 2.499_999_4e-1;
+    p = p * m + 3.333_333_1e-1;
+    let y = m * z * p - 2.121_944_4e-4 * e - 0.5 * z;
+    let y = m + y + 0.693_359_375 * e;
+    if bits == f32::INFINITY.to_bits() { f32::INFINITY } else { y }
+}
+
+/// (sin x, cos x) for |x| ≤ 8π.
+#[inline(always)]
+pub fn sin_cos(x: f32) -> (f32, f32) {
+    const MAGIC: f32 = 12_582_912.0;
+    let n = (x * std::f32::consts::FRAC_2_PI + MAGIC) - MAGIC;
+    // π/2 in three parts.
+    let r = x - n * 1.570_312_5 - n * 4.837_513e-4 - n * 7.549_79e-8;
+    let z = r * r;
+    let s = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * r + r;
+    let c = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
+    let q = n as i32 & 3;
+    let (a, b) = if q & 1 == 0 { (s, c) } else { (c, s) };
+    let sin = if q & 2 == 0 { a } else { -a };
+    let cos = if (q + 1) & 2 == 0 { b } else { -b };
+    (sin, cos)
+}
+
+/// The angle of (x, y) in [−π, π]; 0 at the origin.
+#[inline(always)]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    let (ax, ay) = (x.abs(), y.abs());
+    let (hi, lo) = if ax > ay { (ax, ay) } else { (ay, ax) };
+    let t = lo / hi.max(f32::MIN_POSITIVE);
+    // Reduce to |t| ≤ tan(π/8).
+    let large = t > 0.414_213_57;
+    let r = if large { (t - 1.0) / (t + 1.0) } else { t };
+    let z = r * r;
+    let p = (((8.053_745e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_294_8e-1) * z * r + r;
+    let p = if large { p + std::f32::consts::FRAC_PI_4 } else { p };
+    let a = if ay > ax { FRAC_PI_2 - p } else { p };
+    let a = if x < 0.0 { PI - a } else { a };
+    a.copysign(y)
+}
+
+#[inline(always)]
+fn pow2(n: i32) -> f32 {
+    f32::from_bits(((n + 127) as u32) << 23)
+}

@@ -1,0 +1,308 @@
+//! `Real` for f64, f32 and eight f32 side by side.
+
+use super::elementary;
+use super::real::{Lift, Real, Scalar};
+use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
+
+macro_rules! shared_scalar {
+    ($t:ty) => {
+        #[inline(always)]
+        fn c(x: f64) -> Self {
+            x as $t
+        }
+        #[inline(always)]
+        fn from_f32(x: f32) -> Self {
+            x as $t
+        }
+        #[inline(always)]
+        fn min(self, o: Self) -> Self {
+            <$t>::min(self, o)
+        }
+        #[inline(always)]
+        fn max(self, o: Self) -> Self {
+            <$t>::max(self, o)
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            <$t>::abs(self)
+        }
+        #[inline(always)]
+        fn copysign(self, s: Self) -> Self {
+            <$t>::copysign(self, s)
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            <$t>::sqrt(self)
+        }
+        #[inline(always)]
+        fn floor(self) -> Self {
+            <$t>::floor(self)
+        }
+        #[inline(always)]
+        fn lt(self, o: Self) -> bool {
+            self < o
+        }
+        #[inline(always)]
+        fn le(self, o: Self) -> bool {
+            self <= o
+        }
+        #[inline(always)]
+        fn select(mask: bool, a: Self, b: Self) -> Self {
+            if mask { a } else { b }
+        }
+    };
+}
+
+impl Real for f64 {
+    type Mask = bool;
+    shared_scalar!(f64);
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self * a + b
+    }
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    fn ln(self) -> Self {
+        f64::ln(f64::max(self, f64::MIN_POSITIVE))
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        f64::sin_cos(self)
+    }
+    fn atan2(self, x: Self) -> Self {
+        f64::atan2(self, x)
+    }
+}
+
+impl Real for f32 {
+    type Mask = bool;
+    shared_scalar!(f32);
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        // Not `f32::mul_add`: without the instruction it is a slow library call, and the lanes must agree bit for bit.
+        self * a + b
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        elementary::exp(self)
+    }
+    #[inline(always)]
+    fn ln(self) -> Self {
+        elementary::ln(self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        elementary::sin_cos(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        elementary::atan2(self, x)
+    }
+}
+
+impl Scalar for f64 {
+    fn to_f64(self) -> f64 {
+        self
+    }
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
+    }
+}
+
+impl Scalar for f32 {
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
+}
+
+/// Eight `f32`, computed together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub struct F32x8(pub [f32; 8]);
+
+/// One truth value per lane of [`F32x8`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mask8(pub [bool; 8]);
+
+impl F32x8 {
+    pub const LANES: usize = 8;
+
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        F32x8(std::array::from_fn(|i| f(self.0[i])))
+    }
+    #[inline(always)]
+    fn zip(self, o: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        F32x8(std::array::from_fn(|i| f(self.0[i], o.0[i])))
+    }
+    #[inline(always)]
+    fn test(self, o: Self, f: impl Fn(f32, f32) -> bool) -> Mask8 {
+        Mask8(std::array::from_fn(|i| f(self.0[i], o.0[i])))
+    }
+}
+
+macro_rules! lane_ops {
+    ($($trait:ident $method:ident),*) => { $(
+        impl $trait for F32x8 {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, o: Self) -> Self {
+                self.zip(o, f32::$method)
+            }
+        }
+    )* };
+}
+lane_ops!(Add add, Sub sub, Mul mul, Div div);
+
+impl Neg for F32x8 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|x| -x)
+    }
+}
+impl AddAssign for F32x8 {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Self) {
+        *self = *self + o;
+    }
+}
+impl SubAssign for F32x8 {
+    #[inline(always)]
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+impl MulAssign for F32x8 {
+    #[inline(always)]
+    fn mul_assign(&mut self, o: Self) {
+        *self = *self * o;
+    }
+}
+impl BitAnd for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitand(self, o: Self) -> Self {
+        Mask8(std::array::from_fn(|i| self.0[i] & o.0[i]))
+    }
+}
+impl BitOr for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn bitor(self, o: Self) -> Self {
+        Mask8(std::array::from_fn(|i| self.0[i] | o.0[i]))
+    }
+}
+impl Not for Mask8 {
+    type Output = Self;
+    #[inline(always)]
+    fn not(self) -> Self {
+        Mask8(self.0.map(|x| !x))
+    }
+}
+
+impl Real for F32x8 {
+    type Mask = Mask8;
+
+    #[inline(always)]
+    fn c(x: f64) -> Self {
+        F32x8([x as f32; 8])
+    }
+    #[inline(always)]
+    fn from_f32(x: f32) -> Self {
+        F32x8([x; 8])
+    }
+    #[inline(always)]
+    fn min(self, o: Self) -> Self {
+        self.zip(o, f32::min)
+    }
+    #[inline(always)]
+    fn max(self, o: Self) -> Self {
+        self.zip(o, f32::max)
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(f32::abs)
+    }
+    #[inline(always)]
+    fn copysign(self, s: Self) -> Self {
+        self.zip(s, f32::copysign)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(f32::sqrt)
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        self.map(f32::floor)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self * a + b
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        self.map(elementary::exp)
+    }
+    #[inline(always)]
+    fn ln(self) -> Self {
+        self.map(elementary::ln)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let both = self.0.map(elementary::sin_cos);
+        (F32x8(both.map(|b| b.0)), F32x8(both.map(|b| b.1)))
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        self.zip(x, elementary::atan2)
+    }
+    #[inline(always)]
+    fn lt(self, o: Self) -> Mask8 {
+        self.test(o, |a, b| a < b)
+    }
+    #[inline(always)]
+    fn le(self, o: Self) -> Mask8 {
+        self.test(o, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn select(mask: Mask8, a: Self, b: Self) -> Self {
+        F32x8(std::array::from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
+    }
+}
+
+impl Lift<f32> for F32x8 {
+    #[inline(always)]
+    fn lift(s: f32) -> Self {
+        F32x8([s; 8])
+    }
+    #[inline(always)]
+    fn gather(table: &[f32], index: Self) -> Self {
+        index.map(|i| table[i as usize])
+    }
+}
+
+impl Lift<f32> for f32 {
+    #[inline(always)]
+    fn lift(s: f32) -> Self {
+        s
+    }
+    #[inline(always)]
+    fn gather(table: &[f32], index: f32) -> f32 {
+        table[index as usize]
+    }
+}
+
+impl Lift<f64> for f64 {
+    #[inline(always)]
+    fn lift(s: f64) -> Self {
+        s
+    }
+    #[inline(always)]
+    fn gather(table: &[f64], index: f64) -> f64 {
+        table[index as usize]
+    }
+}

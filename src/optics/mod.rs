@@ -1,0 +1,13 @@
+//! Numbers, vectors, frames and sampling: what lobe maths stands on. Knows no lobe.
+
+pub mod elementary;
+pub mod frame;
+pub mod lanes;
+pub mod real;
+pub mod sampling;
+pub mod vec3;
+
+pub use frame::Frame;
+pub use lanes::F32x8;
+pub use real::{Lift, Real, Scalar};
+pub use vec3::V3;

@@ -1,0 +1,104 @@
+//! The number types lobe maths is written over.
+//!
+//! One source text of every formula serves three evaluators: `f64` (the reference), `f32` (the standard tier) and
+//! [`F32x8`](super::lanes::F32x8) (batches). [`Real`] is what that text may use: arithmetic, a handful of functions,
+//! comparisons that give a mask, and `select` in place of `if`. `f32` and the lanes share one `exp`, `ln`, `sin`
+//! and `atan2` (see [`super::elementary`]), so a batch gives bit for bit what the scalar call gives.
+
+use core::fmt::Debug;
+use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
+
+/// A real number, or several side by side.
+pub trait Real:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + MulAssign
+{
+    /// The outcome of a comparison, one truth value per lane.
+    type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+
+    /// A constant, rounded to this type.
+    fn c(x: f64) -> Self;
+    /// A script value, taken as it is.
+    fn from_f32(x: f32) -> Self;
+
+    /// The smaller of the two; the other one if one is NaN.
+    fn min(self, o: Self) -> Self;
+    /// The larger of the two; the other one if one is NaN.
+    fn max(self, o: Self) -> Self;
+    fn abs(self) -> Self;
+    /// `self` with the sign of `s`.
+    fn copysign(self, s: Self) -> Self;
+    fn sqrt(self) -> Self;
+    fn floor(self) -> Self;
+    /// `self·a + b`, fused where the machine fuses.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// eˣ; 0 below the range of the type, +∞ above it.
+    fn exp(self) -> Self;
+    /// Natural logarithm of a positive number; of 0 or less: a large negative finite number.
+    fn ln(self) -> Self;
+    /// Sine and cosine, for |x| up to 8π.
+    fn sin_cos(self) -> (Self, Self);
+    /// The angle of (x, y), in [−π, π]; 0 at the origin.
+    fn atan2(self, x: Self) -> Self;
+
+    fn lt(self, o: Self) -> Self::Mask;
+    fn le(self, o: Self) -> Self::Mask;
+    fn gt(self, o: Self) -> Self::Mask {
+        o.lt(self)
+    }
+    fn ge(self, o: Self) -> Self::Mask {
+        o.le(self)
+    }
+    /// `a` where the mask is set, else `b`.
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+
+    /// xʸ for x ≥ 0, as exp(y·ln x). 0⁰ = 1.
+    fn powf(self, y: Self) -> Self {
+        (y * self.ln()).exp()
+    }
+    /// x² .
+    fn sq(self) -> Self {
+        self * self
+    }
+    /// `self` limited to `[lo, hi]`; NaN becomes `lo`.
+    fn clamp(self, lo: Self, hi: Self) -> Self {
+        self.max(lo).min(hi)
+    }
+    /// Square root of a number that rounding may have pushed below zero.
+    fn safe_sqrt(self) -> Self {
+        self.max(Self::c(0.0)).sqrt()
+    }
+    fn zero() -> Self {
+        Self::c(0.0)
+    }
+    fn one() -> Self {
+        Self::c(1.0)
+    }
+}
+
+/// One number type for a single value, as opposed to lanes: what a BSDF is built in.
+pub trait Scalar: Real<Mask = bool> + PartialOrd + Lift<Self> {
+    fn to_f64(self) -> f64;
+    fn to_f32(self) -> f32 {
+        self.to_f64() as f32
+    }
+    fn is_finite(self) -> bool;
+}
+
+/// Brings what a lobe stores into the type a formula is evaluated in: a lobe prepared in `f32` evaluates over lanes.
+pub trait Lift<S>: Real {
+    fn lift(s: S) -> Self;
+    /// `table[index]` per lane; `index` holds whole numbers inside the table.
+    fn gather(table: &[S], index: Self) -> Self;
+}

@@ -1,0 +1,26 @@
+//! Maps from the unit square to directions, each beside its density.
+
+use super::{Real, V3};
+use std::f64::consts::{FRAC_1_PI, TAU};
+
+/// A direction about z with density cos θ/π.
+pub fn cosine_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
+    let r = u[0].sqrt();
+    let (s, c) = (u[1] * R::c(TAU)).sin_cos();
+    V3::new(r * c, r * s, (R::one() - u[0]).safe_sqrt())
+}
+
+/// Density of [`cosine_hemisphere`]; 0 below the surface.
+pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
+    cos.max(R::zero()) * R::c(FRAC_1_PI)
+}
+
+/// A direction about z, uniform over the upper hemisphere.
+pub fn uniform_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
+    V3::polar(u[0], u[1] * R::c(TAU))
+}
+
+/// Density of [`uniform_hemisphere`]; 0 below the surface.
+pub fn uniform_hemisphere_pdf<R: Real>(cos: R) -> R {
+    R::select(cos.gt(R::zero()), R::c(0.5 * FRAC_1_PI), R::zero())
+}

@@ -1,0 +1,1 @@
+//! Scenes, integrator, film: pictures of a material.
