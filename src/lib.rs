@@ -1,5 +1,6 @@
 #![deny(unsafe_code)]
 pub mod albedo;
+pub mod audit;
 pub mod closure;
 pub mod engine;
 pub mod globals;

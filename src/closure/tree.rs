@@ -40,9 +40,45 @@ pub const MAX_WEIGHT: f32 = 1e30;
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
     nodes: SmallVec<[Node; 20]>,
+    sizes: SmallVec<[Size; 20]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
 }
+
+/// How much a node comes to when it is written out in full: a node may be used twice, so a tree of sixty nodes can
+/// stand for 2⁶⁰ lobes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
+    /// Lobes, saturating.
+    pub lobes: u32,
+    /// Layers on the longest way down, saturating.
+    pub layers: u16,
+}
+
+/// Most lobes a tree may come to.
+pub const MAX_LOBES: u32 = 1 << 20;
+/// Most layers on any way from the root to a lobe.
+pub const MAX_LAYERS: u16 = 256;
+
+/// A tree that goes beyond a budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TreeError {
+    /// More than [`MAX_LOBES`] lobes.
+    TooManyLobes,
+    /// Layers nested deeper than [`MAX_LAYERS`].
+    TooDeep,
+}
+
+impl std::fmt::Display for TreeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            TreeError::TooManyLobes => write!(f, "the closure comes to more than {MAX_LOBES} lobes"),
+            TreeError::TooDeep => write!(f, "layers are nested deeper than {MAX_LAYERS}"),
+        }
+    }
+}
+
+impl std::error::Error for TreeError {}
 
 impl Default for ClosureTree {
     fn default() -> Self {
@@ -53,14 +89,16 @@ impl Default for ClosureTree {
 impl ClosureTree {
     /// A black tree.
     pub fn new() -> Self {
-        let mut nodes = SmallVec::new();
-        nodes.push(Node::Zero);
-        ClosureTree { nodes, slots: SmallVec::new(), root: NodeId(0) }
+        let mut tree =
+            ClosureTree { nodes: SmallVec::new(), sizes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0) };
+        tree.push(Node::Zero);
+        tree
     }
 
     /// Back to black, keeping what memory there is.
     pub fn clear(&mut self) {
         self.nodes.truncate(1);
+        self.sizes.truncate(1);
         self.slots.clear();
         self.root = NodeId(0);
     }
@@ -144,9 +182,49 @@ impl ClosureTree {
         &self.slots[start as usize..start as usize + kind.spec().slot_count()]
     }
 
+    /// Every lobe node made: its site, kind and parameter block.
+    pub fn lobes(&self) -> impl Iterator<Item = (u32, LobeKind, &[f32])> {
+        self.nodes.iter().filter_map(|n| match *n {
+            Node::Lobe { kind, site, slots } => Some((site, kind, self.values(kind, slots))),
+            _ => None,
+        })
+    }
+
+    /// What a node comes to, written out.
+    pub fn size(&self, id: NodeId) -> Size {
+        self.sizes[id.index()]
+    }
+
+    /// Whether the tree is within [`MAX_LOBES`] and [`MAX_LAYERS`].
+    pub fn within_budget(&self) -> Result<(), TreeError> {
+        let size = self.size(self.root);
+        if size.layers > MAX_LAYERS {
+            Err(TreeError::TooDeep)
+        } else if size.lobes > MAX_LOBES {
+            Err(TreeError::TooManyLobes)
+        } else {
+            Ok(())
+        }
+    }
+
     fn push(&mut self, node: Node) -> NodeId {
         let id = NodeId(self.nodes.len() as u32);
+        let both = |a: NodeId, b: NodeId| {
+            let (a, b) = (self.size(a), self.size(b));
+            Size { lobes: a.lobes.saturating_add(b.lobes), layers: a.layers.max(b.layers) }
+        };
+        let size = match node {
+            Node::Zero => Size::default(),
+            Node::Lobe { .. } => Size { lobes: 1, layers: 0 },
+            Node::Mul(_, c) => self.size(c),
+            Node::Add(a, b) => both(a, b),
+            Node::Layer { top, base } => {
+                let size = both(top, base);
+                Size { layers: size.layers.saturating_add(1), ..size }
+            }
+        };
         self.nodes.push(node);
+        self.sizes.push(size);
         id
     }
 }

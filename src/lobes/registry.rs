@@ -88,8 +88,35 @@ pub struct LobeSpec {
 
 impl LobeSpec {
     /// Number of f32 slots of a parameter block.
-    pub fn slot_count(&self) -> usize {
-        self.params.iter().map(|p| p.ty.slots()).sum()
+    pub const fn slot_count(&self) -> usize {
+        let (mut slots, mut i) = (0, 0);
+        while i < self.params.len() {
+            slots += self.params[i].ty.slots();
+            i += 1;
+        }
+        slots
+    }
+
+    /// Where the lobe's own shading normal starts in its block: its first `normal` parameter.
+    pub const fn normal_slot(&self) -> Option<usize> {
+        self.first_slot(ParamTy::Normal)
+    }
+
+    /// Where the lobe's tangent starts in its block: its first `vector` parameter.
+    pub const fn tangent_slot(&self) -> Option<usize> {
+        self.first_slot(ParamTy::Vector)
+    }
+
+    const fn first_slot(&self, ty: ParamTy) -> Option<usize> {
+        let (mut at, mut i) = (0, 0);
+        while i < self.params.len() {
+            if self.params[i].ty as u8 == ty as u8 {
+                return Some(at);
+            }
+            at += self.params[i].ty.slots();
+            i += 1;
+        }
+        None
     }
 
     /// The first slot of the parameter called `name`.
@@ -244,7 +271,7 @@ macro_rules! closure {
                 class: $crate::lobes::registry::LobeClass::$class,
             };
 
-            #[allow(unused_assignments, unused_variables, unused_mut)]
+            #[allow(unused_assignments, unused_variables, unused_mut, non_snake_case)]
             fn from_slots(slots: &[f32]) -> Self {
                 let mut at = 0;
                 let mut index = 0;
