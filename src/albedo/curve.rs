@@ -56,7 +56,7 @@ pub struct Precision {
 
 impl Precision {
     /// Within 1e-3 of the quadrature (2e-3 where a parameter varies).
-    pub const STANDARD: Precision = Precision { cos_nodes: 128, axis_nodes: 32, polar: 32, azimuth: 24, margin: 1e-5 };
+    pub const STANDARD: Precision = Precision { cos_nodes: 160, axis_nodes: 32, polar: 32, azimuth: 24, margin: 1e-5 };
     /// Interpolation below 5e-6.
     pub const REFERENCE: Precision = Precision { cos_nodes: 512, axis_nodes: 96, polar: 64, azimuth: 48, margin: 2e-6 };
 }
