@@ -143,7 +143,8 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// f·|cos| and pdf of one direction.
     ///
-    /// `wi`: world space, unit, away from the surface. Directions that are not finite give black and pdf 0.
+    /// `wi`: world space, unit, away from the surface. A direction that is not finite, or shorter than ½ or longer than
+    /// 2, gives black and pdf 0.
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
         let mut pdf = S::zero();
         let f_cos = self.sum(vector(wi.into()), Cosine::Light, |l, local| {
@@ -379,6 +380,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         mut visit: impl FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>),
         done: impl FnOnce(Rgb<L>),
     ) {
+        let wi = unit_or_zero(wi);
         let mut stack = LayerStack::<L, D>::default();
         let mut frame = u32::MAX;
         let mut local = wi;
@@ -421,6 +423,14 @@ fn weighted<S: Scalar, L: Real + Lift<S>>(l: &FlatLobe<'_, S>, scale: Rgb<L>, lo
         Cosine::None => L::one(),
     };
     std::array::from_fn(|c| L::lift(l.weight[c]) * scale[c] * f[c] * cos)
+}
+
+/// Directions that are not finite, or far from unit length, become zero: in every surface at once, hence black.
+#[inline(always)]
+fn unit_or_zero<L: Real>(w: V3<L>) -> V3<L> {
+    let length = w.length_squared();
+    let fine = length.gt(L::c(0.25)) & length.lt(L::c(4.0));
+    w.map(|x| L::select(fine, x, L::zero()))
 }
 
 #[inline(always)]

@@ -40,7 +40,7 @@ pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> Node
 }
 
 /// A parameter block: `pick` gives a value per parameter, else its default.
-pub fn block(kind: LobeKind, pick: impl Fn(&ParamSpec) -> Option<f32>) -> Vec<f32> {
+pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) -> Vec<f32> {
     let mut values = Vec::new();
     for p in kind.spec().params {
         match p.ty {
