@@ -64,12 +64,14 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
-    /// Clamps one slot value to the declared range; NaN becomes the default (or the lower end without one).
+    /// A slot value as lobes read it: clamped to the declared range, whole where the type is; NaN becomes the default
+    /// (or the lower end without one).
     pub fn clamp(&self, slot: usize, value: f32) -> f32 {
         if value.is_nan() {
             return self.default.get(slot).copied().unwrap_or(if self.min.is_finite() { self.min } else { 0.0 });
         }
-        value.clamp(self.min, self.max)
+        let value = value.clamp(self.min, self.max);
+        if matches!(self.ty, ParamTy::Int | ParamTy::String) { value.trunc() } else { value }
     }
 }
 
