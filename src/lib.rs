@@ -4,6 +4,7 @@ pub mod closure;
 pub mod diag;
 pub mod engine;
 pub mod globals;
+pub mod ir;
 pub mod lobes;
 pub mod optics;
 #[cfg(feature = "cli")]

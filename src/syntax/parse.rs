@@ -391,7 +391,8 @@ impl Builder {
 
     /// Joins the last operator with its operands.
     fn reduce(&mut self) {
-        let (Some(op), Some(right), Some(left)) = (self.operators.pop(), self.operands.pop(), self.operands.pop()) else {
+        let (Some(op), Some(right), Some(left)) = (self.operators.pop(), self.operands.pop(), self.operands.pop())
+        else {
             return;
         };
         let mut whole = self.ast.expr(left).span.to(self.ast.expr(right).span);
