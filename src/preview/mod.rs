@@ -1,1 +1,252 @@
-//! Scenes, integrator, film: pictures of a material.
+//! Pictures of a material.
+//!
+//! In come a [`Surface`] (any [`Material`](crate::Material) is one) and [`RenderSettings`]; out comes an [`Image`] of
+//! linear radiance and the [`Stats`] of making it. A [`Stage`] holds what does not depend on the material – geometry,
+//! camera, environment – so that a sweep, a comparison or a watched file pays for it once. [`output`] writes pictures,
+//! [`strip`] sets several side by side. Nothing here knows what a script or a closure tree is, or which lobes exist.
+//!
+//! The world is y-up, in arbitrary units in which the sphere's radius is one. The same settings give the same picture,
+//! bit for bit, whatever the number of threads.
+
+mod camera;
+mod drape;
+mod environment;
+mod film;
+mod image;
+mod integrator;
+mod label;
+mod mesh;
+pub mod output;
+mod sampler;
+mod scene;
+mod sphere;
+pub mod strip;
+mod studio;
+mod surface;
+mod tone;
+
+pub use drape::drape_mesh;
+pub use environment::Environment;
+pub use image::Image;
+pub use mesh::{Mesh, Vertex};
+pub use surface::{Scatter, Surface};
+pub use tone::display;
+
+use crate::engine::ShadeError;
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// What the material is shown on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scene {
+    /// A sphere on a neutral floor.
+    Sphere,
+    /// A square cloth hanging over a ball, its corners on the floor.
+    Drape,
+    /// A sphere in uniform white light, without a floor: a lossless white material cannot be seen.
+    Furnace,
+}
+
+/// Everything but the material that decides a picture.
+#[derive(Clone, Debug)]
+pub struct RenderSettings {
+    pub scene: Scene,
+    /// A lat-long HDR or EXR picture to light the scene; the built-in studio if none. [`Scene::Furnace`] ignores it.
+    pub env: Option<PathBuf>,
+    /// Camera samples per pixel, at least 1.
+    pub spp: u32,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    pub seed: u64,
+    /// Worker threads; 0 means one per core. Never changes the picture.
+    pub threads: usize,
+    /// In stops, applied on the way to a display only: an EXR keeps the radiance as it is.
+    pub exposure: f32,
+    /// How many times a path may scatter, at least 1. 1 is direct light only.
+    pub max_depth: u32,
+    /// Whether the environment is sampled directly besides sampling the BSDF. Off, the picture has the same mean and
+    /// more noise.
+    pub sample_env: bool,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        RenderSettings {
+            scene: Scene::Sphere,
+            env: None,
+            spp: 64,
+            width: 512,
+            height: 512,
+            seed: 0,
+            threads: 0,
+            exposure: 0.0,
+            max_depth: 8,
+            sample_env: true,
+        }
+    }
+}
+
+/// How a caller follows a render and stops it. Both may be used from any thread.
+#[derive(Clone, Copy)]
+pub struct Control<'a> {
+    /// Told how many of how many equal portions are finished; called by worker threads, `done` not always in order.
+    pub progress: &'a (dyn Fn(u64, u64) + Sync),
+    /// Set it to stop: [`Stage::render`] then returns [`RenderError::Cancelled`] within a fraction of a second.
+    pub cancel: &'a AtomicBool,
+}
+
+impl Control<'static> {
+    /// Tells nobody, never stops.
+    pub fn quiet() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Control { progress: &|_, _| {}, cancel: &NEVER }
+    }
+}
+
+/// A finished picture and what it took.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    pub image: Image,
+    pub stats: Stats,
+}
+
+/// What a render took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stats {
+    /// Wall clock, without preparing the stage.
+    pub seconds: f64,
+    /// Camera paths.
+    pub samples: u64,
+    /// Rays traced, shadow rays included.
+    pub rays: u64,
+    /// Paths thrown away because they came back NaN, infinite or negative. Anything but 0 is a bug in the material.
+    pub invalid: u64,
+}
+
+impl Stats {
+    /// Adds up the work of several pictures.
+    pub fn plus(self, other: Stats) -> Stats {
+        Stats {
+            seconds: self.seconds + other.seconds,
+            samples: self.samples + other.samples,
+            rays: self.rays + other.rays,
+            invalid: self.invalid + other.invalid,
+        }
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug)]
+pub enum RenderError {
+    /// A setting is out of range; the text says which.
+    Settings(String),
+    /// The environment picture cannot be used.
+    Environment { path: PathBuf, reason: String },
+    /// The material failed to shade somewhere.
+    Shade(ShadeError),
+    /// The worker threads could not be started.
+    Threads(String),
+    /// [`Control::cancel`] was set.
+    Cancelled,
+}
+
+impl fmt::Display for RenderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RenderError::Settings(what) => f.write_str(what),
+            RenderError::Environment { path, reason } => {
+                write!(f, "cannot use `{}` as environment: {reason}", path.display())
+            }
+            RenderError::Shade(e) => write!(f, "shading failed: {e:?}"),
+            RenderError::Threads(reason) => write!(f, "cannot start the render threads: {reason}"),
+            RenderError::Cancelled => f.write_str("the render was stopped"),
+        }
+    }
+}
+
+impl std::error::Error for RenderError {}
+
+/// Prepares a stage and renders one picture on it.
+pub fn render<S: Surface>(
+    surface: &S,
+    settings: &RenderSettings,
+    control: Control<'_>,
+) -> Result<Rendered, RenderError> {
+    Stage::new(settings)?.render(surface, control)
+}
+
+/// Geometry, camera and light, ready to show materials.
+pub struct Stage {
+    settings: RenderSettings,
+    world: scene::World,
+    camera: camera::Camera,
+    pool: rayon::ThreadPool,
+}
+
+impl Stage {
+    /// Checks the settings, loads the environment and lays out the scene.
+    pub fn new(settings: &RenderSettings) -> Result<Stage, RenderError> {
+        check(settings)?;
+        let environment = match (settings.scene, &settings.env) {
+            (Scene::Furnace, _) => Environment::uniform(1.0),
+            (_, Some(path)) => Environment::open(path)
+                .map_err(|reason| RenderError::Environment { path: path.clone(), reason })?,
+            (_, None) => studio::environment(),
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(settings.threads)
+            .build()
+            .map_err(|e| RenderError::Threads(e.to_string()))?;
+        let aspect = settings.width as f32 / settings.height as f32;
+        Ok(Stage {
+            settings: settings.clone(),
+            world: scene::World::new(settings.scene, environment),
+            camera: scene::camera(settings.scene, aspect),
+            pool,
+        })
+    }
+
+    /// Shows one material.
+    pub fn render<S: Surface>(&self, surface: &S, control: Control<'_>) -> Result<Rendered, RenderError> {
+        let start = Instant::now();
+        let tracer = integrator::Tracer::new(&self.world, surface, &self.settings);
+        let (image, tally) =
+            self.pool.install(|| film::expose(&self.settings, &self.camera, &tracer, control))?;
+        let stats = Stats {
+            seconds: start.elapsed().as_secs_f64(),
+            samples: u64::from(self.settings.spp) * u64::from(image.width()) * u64::from(image.height()),
+            rays: tally.rays,
+            invalid: tally.invalid,
+        };
+        Ok(Rendered { image, stats })
+    }
+}
+
+/// The largest width or height, in pixels.
+pub const MAX_SIZE: u32 = 16_384;
+/// The most pixels of one picture.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
+fn check(s: &RenderSettings) -> Result<(), RenderError> {
+    let wrong = |what: String| Err(RenderError::Settings(what));
+    if s.width == 0 || s.height == 0 || s.width > MAX_SIZE || s.height > MAX_SIZE {
+        return wrong(format!("a picture of {}×{} pixels: each side must lie in 1 to {MAX_SIZE}", s.width, s.height));
+    }
+    if u64::from(s.width) * u64::from(s.height) > MAX_PIXELS {
+        return wrong(format!("a picture of {}×{} pixels is larger than {MAX_PIXELS} pixels", s.width, s.height));
+    }
+    if s.spp == 0 {
+        return wrong("0 samples per pixel: at least 1 is needed".into());
+    }
+    if s.max_depth == 0 {
+        return wrong("a path depth of 0 shows no light: at least 1 is needed".into());
+    }
+    if s.threads > 1024 {
+        return wrong(format!("{} threads: at most 1024", s.threads));
+    }
+    Ok(())
+}

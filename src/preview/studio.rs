@@ -1,0 +1,49 @@
+//! The built-in environment: a soft studio.
+//!
+//! A large key light from the upper left front, a dim fill from the right, and two lights behind the subject whose
+//! grazing light is what makes cloth glow at its rim. The lower half is the colour of an endless backdrop. All edges
+//! are wide, so that shadows are soft. Nothing bright lies where the camera looks.
+
+use super::environment::{Environment, from_square};
+use glam::{Vec3, vec2, vec3};
+
+const WIDTH: usize = 512;
+const HEIGHT: usize = 256;
+
+/// A round light with a soft edge.
+struct Lamp {
+    toward: Vec3,
+    /// Angle from the centre at which it starts to fade, and where it ends, in degrees.
+    edge: [f32; 2],
+    radiance: Vec3,
+}
+
+const LAMPS: [Lamp; 4] = [
+    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [14.0, 32.0], radiance: vec3(8.6, 8.2, 7.6) },
+    Lamp { toward: vec3(0.90, 0.30, 0.50), edge: [10.0, 50.0], radiance: vec3(0.50, 0.55, 0.62) },
+    Lamp { toward: vec3(0.72, 0.55, -0.80), edge: [10.0, 30.0], radiance: vec3(5.2, 5.5, 6.0) },
+    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 28.0], radiance: vec3(3.4, 3.5, 3.7) },
+];
+
+pub fn environment() -> Environment {
+    let pixels = (0..WIDTH * HEIGHT).map(|i| {
+        let at = vec2((i % WIDTH) as f32 + 0.5, (i / WIDTH) as f32 + 0.5);
+        radiance(from_square(at / vec2(WIDTH as f32, HEIGHT as f32)).0)
+    });
+    Environment::from_pixels(WIDTH, HEIGHT, pixels.collect())
+}
+
+fn radiance(dir: Vec3) -> Vec3 {
+    const BACKDROP: Vec3 = vec3(0.30, 0.30, 0.31);
+    const ZENITH: Vec3 = vec3(0.55, 0.58, 0.64);
+    let sky = BACKDROP.lerp(ZENITH, smoothstep(0.0, 0.9, dir.y));
+    LAMPS.iter().fold(sky, |sum, lamp| {
+        let [inner, outer] = lamp.edge.map(|degrees| degrees.to_radians().cos());
+        sum + lamp.radiance * smoothstep(outer, inner, dir.dot(lamp.toward.normalize()))
+    })
+}
+
+fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
