@@ -124,7 +124,8 @@ impl Shader {
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
         let curves = bake(program.sites(), self.engine.tier.precision());
-        let inner = Inner { engine: self.engine, name: self.name().to_owned(), program, curves, reference: OnceLock::new() };
+        let inner =
+            Inner { engine: self.engine, name: self.name().to_owned(), program, curves, reference: OnceLock::new() };
         let material = Material { inner: Arc::new(inner) };
         if self.engine.tier == Tier::Reference {
             material.reference_curves();
@@ -159,7 +160,7 @@ impl Material {
 
     /// What looked wrong while specialising and is not an error.
     pub fn warnings(&self) -> &[Diagnostic] {
-        self.inner.program.warnings()
+        &self.inner.program.warnings
     }
 
     /// The compiled script: which globals it reads, which lobes it can construct.

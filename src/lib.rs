@@ -1,6 +1,8 @@
 #![deny(unsafe_code)]
 pub mod albedo;
 pub mod audit;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod closure;
 pub mod diag;
 pub mod engine;
@@ -13,5 +15,5 @@ pub mod preview;
 pub mod span;
 pub mod syntax;
 
-pub use engine::Material;
+pub use engine::{Engine, Material, Shader};
 pub use globals::Globals;

@@ -89,9 +89,7 @@ fn measure<S: Evaluate>(material: &Material, cosines: &[f64], args: &AlbedoArgs)
     let globals = Globals::default();
     // Budgets depend on the script alone or on few points; whatever fails is told once, before integrating.
     S::shade(material, &globals, [S::zero(), S::zero(), S::one()])?;
-    let subject = |wo: [S; 3]| {
-        S::shade(material, &globals, wo).unwrap_or_else(|_| crate::closure::Bsdf::black())
-    };
+    let subject = |wo: [S; 3]| S::shade(material, &globals, wo).unwrap_or_else(|_| crate::closure::Bsdf::black());
     let side = match args.side {
         SideArg::View => Side::View,
         SideArg::Light => Side::Light,
@@ -133,7 +131,8 @@ fn explain<S: Evaluate>(
 }
 
 fn explain_text(explained: &Value, text: &mut String) {
-    let triple = |v: &Value| (0..3).map(|c| format!("{:8.5}", v[c].as_f64().unwrap_or(0.0))).collect::<Vec<_>>().join(" ");
+    let triple =
+        |v: &Value| (0..3).map(|c| format!("{:8.5}", v[c].as_f64().unwrap_or(0.0))).collect::<Vec<_>>().join(" ");
     if let Some(note) = explained["note"].as_str() {
         let _ = writeln!(text, "         {note}");
     }

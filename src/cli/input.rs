@@ -3,7 +3,7 @@
 use super::{Failure, Global, LayeringArg, TierArg, TintArg};
 use crate::closure::{Bsdf, LayeringRule, TintRule};
 use crate::diag::Diagnostic;
-use crate::engine::{Engine, Material, Shader, ShadeError, Tier};
+use crate::engine::{Engine, Material, ShadeError, Shader, Tier};
 use crate::globals::Globals;
 use crate::ir::{ParamDecl, Ty, Value};
 use crate::optics::{Scalar, V3, frame};

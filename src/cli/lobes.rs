@@ -10,9 +10,9 @@ use std::fmt::Write;
 pub fn run(global: &Global, name: Option<&str>) -> Outcome {
     let chosen: Vec<Form> = forms().filter(|f| name.is_none_or(|n| f.name == n)).collect();
     if let (Some(name), true) = (name, chosen.is_empty()) {
-        let nearest = forms().map(|f| f.name).max_by(|a, b| {
-            strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name))
-        });
+        let nearest = forms()
+            .map(|f| f.name)
+            .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
         let hint = nearest.map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
         return Err(Failure::usage(format!("there is no closure called `{name}`{hint}")));
     }

@@ -38,11 +38,7 @@ fn draw<S: Evaluate>(global: &Global, material: &Material, wo: [f64; 3], count: 
             }));
             continue;
         }
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{},{},{}",
-            wi[0], wi[1], wi[2], f[0], f[1], f[2], pdf, u8::from(delta)
-        );
+        let _ = writeln!(text, "{},{},{},{},{},{},{},{}", wi[0], wi[1], wi[2], f[0], f[1], f[2], pdf, u8::from(delta));
         if index % CHUNK == CHUNK - 1 {
             output::write(&text)?;
             text.clear();

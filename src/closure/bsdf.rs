@@ -125,6 +125,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
+    /// A BSDF that scatters nothing.
+    pub fn black() -> Self {
+        let zero = V3::new(S::zero(), S::zero(), S::zero());
+        Bsdf::empty(zero, zero, Layering::default(), 0)
+    }
+
     /// Turns estimated albedos into probabilities and drops nothing.
     pub(crate) fn finish(&mut self) {
         let share = |l: &FlatLobe<S>| {

@@ -40,6 +40,15 @@ impl std::fmt::Display for ShadeError {
 
 impl std::error::Error for ShadeError {}
 
+impl From<crate::closure::TreeError> for ShadeError {
+    fn from(e: crate::closure::TreeError) -> ShadeError {
+        match e {
+            crate::closure::TreeError::TooManyLobes => ShadeError::TooManyLobes,
+            crate::closure::TreeError::TooDeep => ShadeError::TooManyLayers,
+        }
+    }
+}
+
 /// One place in a program that makes a lobe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
