@@ -192,12 +192,201 @@ shader all [[ string help = "a\"b" ]] (
     c.r = c[2] *= 2;
     if (a > 1 && !(b == 0) || mode) { float a = 3; b += a; } else if (u < 0.5) b -= 1; else { ; }
     b = a = b > 1 ? sin(u) : mode >> 1;
-    vector w = normalize((vector) P + dPdu) ^ 1;
+    vector w = normalize((vector) P + dPdu) * (1 ^ 1);
     Ci = c * diffuse(Nn) + mix(translucent(N), diffuse(-Nn), b);
     Ci = sheen(Ci, N, tint, r, "softening", backfacing());
     Ci += layer(sheen_bsdf(N, c, clamp(r, 0, 1)), oren_nayar(N, 0.3)) + emission();
 }
 "#;
+
+#[test]
+fn the_script_that_uses_everything_is_a_script() {
+    program(EVERYTHING);
+}
+
+fn messages(source: &str) -> String {
+    match ir::compile("velvet.osl", source) {
+        Ok((_, warnings)) => diag::render_all(&warnings, &Source::new("velvet.osl", source), false),
+        Err(errors) => diag::render_all(&errors, &Source::new("velvet.osl", source), false),
+    }
+}
+
+#[test]
+fn messages_show_the_place_and_what_to_do() {
+    insta::assert_snapshot!(messages("surface s(float roughness = 0.3) {\n    Ci = sheen(diffuse(N), N, 1, roughnes);\n}\n"), @r##"
+error[E0201]: unknown name `roughnes`
+ --> velvet.osl:2:34
+  |
+2 |     Ci = sheen(diffuse(N), N, 1, roughnes);
+  |                                  ^^^^^^^^ not declared here
+  |
+  = help: did you mean `roughness`?
+"##);
+    insta::assert_snapshot!(messages("Ci = diffuse(N) * translucent(N);"), @r##"
+error[E0301]: closures cannot be multiplied with each other
+ --> velvet.osl:1:6
+  |
+1 | Ci = diffuse(N) * translucent(N);
+  |      ----------^^^--------------
+  |      |            |
+  |      |            closure color
+  |      closure color
+  |
+  = help: scale a closure by a color or float, or put one over the other with `layer(top, base)`
+"##);
+    insta::assert_snapshot!(messages("color c = 1;\nfloat f = c;\nf = f % 2.0;"), @r##"
+error[E0203]: expected float, found color
+ --> velvet.osl:2:11
+  |
+2 | float f = c;
+  |           ^ this is color
+  |
+  = help: take one component, `c[0]`, or `luminance(c)`
+
+error[E0204]: `%` does not apply to float and float
+ --> velvet.osl:3:5
+  |
+3 | f = f % 2.0;
+  |     -^^^---
+  |     |   |
+  |     |   float
+  |     float
+  |
+  = help: `%` is for ints; for floats call `mod(a, b)` or `fmod(a, b)`
+
+warning[W0501]: `Ci` is never assigned: the material is black
+ --> velvet.osl:1:1
+  |
+1 | color c = 1;
+  | ^
+  |
+  = help: assign a closure, for example `Ci = diffuse(N);`
+"##);
+    insta::assert_snapshot!(messages("float x = 1\nCi = x * diffuse(N);\nfor (x = 0; x < 2; x += 1) { }"), @r##"
+error[E0107]: a `;` is missing after this
+ --> velvet.osl:1:11
+  |
+1 | float x = 1
+  |           ^ expected `;` here
+
+error[E0109]: loops are not supported
+ --> velvet.osl:3:1
+  |
+3 | for (x = 0; x < 2; x += 1) { }
+  | ^^^
+"##);
+    insta::assert_snapshot!(messages("Ci = layer(diffuse(N), 0.5);"), @r##"
+error[E0205]: `base` of `layer` is closure color, not float
+ --> velvet.osl:1:24
+  |
+1 | Ci = layer(diffuse(N), 0.5);
+  |                        ^^^ expected closure color, found float
+  |
+  = help: declared as `layer(closure color top, closure color base)`
+"##);
+    insta::assert_snapshot!(messages("Ci = (diffuse(N) + [1);"), @r##"
+error[E0102]: expected `]` before this `)`
+ --> velvet.osl:1:22
+  |
+1 | Ci = (diffuse(N) + [1);
+  |                    - ^
+  |                    |
+  |                    this `[` is still open
+"##);
+    insta::assert_snapshot!(messages(&format!("Ci = {}glass(N){};", "diffuse(N) + ".repeat(99), " + diffuse(N)".repeat(99))), @r##"
+error[E0206]: unknown function `glass`
+ --> velvet.osl:1:1293
+  |
+ ::: 
+1 | ...+ diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + glass(N) + diffuse(N) + diffuse(N) + diffuse(N) + ...
+  |                                                                                    ^^^^^
+"##);
+    insta::assert_snapshot!(messages("#include \"my.h\"\nfloat x = 1;"), @r##"
+error[E0103]: unknown header `my.h`
+ --> velvet.osl:1:1
+  |
+1 | #include "my.h"
+  | ^^^^^^^^^^^^^^^
+  |
+  = help: these are built in: stdosl.h, oslutil.h, stdcycles.h, mx_funcs.h, overcoat.h
+"##);
+    insta::assert_snapshot!(messages("surface s() { diffuse(N); }"), @r##"
+warning[W0502]: this statement has no effect
+ --> velvet.osl:1:15
+  |
+1 | surface s() { diffuse(N); }
+  |               ^^^^^^^^^^
+  |
+  = help: to make it part of the material write `Ci = …` or `Ci += …`
+
+warning[W0501]: `Ci` is never assigned: the material is black
+ --> velvet.osl:1:9
+  |
+1 | surface s() { diffuse(N); }
+  |         ^
+  |
+  = help: assign a closure, for example `Ci = diffuse(N);`
+"##);
+}
+
+#[test]
+fn messages_have_a_plain_form() {
+    let source = Source::new("a.osl", "float x = 1;\nCi = y * diffuse(N);");
+    let errors = ir::compile(&source.name, &source.text).unwrap_err();
+    assert_eq!(errors[0].line(&source), "a.osl:2:6: error[E0201]: unknown name `y`");
+}
+
+const PARAMETERS: &str = r#"surface cloth [[ string help = "woven" ]] (
+    color tint = color(1, 0.5, 0) [[ string label = "Tint", color max = color(1, 1, 1) ]],
+    float r = 0.3 [[ float min = 0.07, float max = 1 ]],
+    float r2 = r * r, int n = 2, normal Nn = N, string word = "a"
+) { Ci = tint * oren_nayar(Nn, r2) + (n == 3 && word == "b") * translucent(N); }"#;
+
+#[test]
+fn parameters_are_declared_and_set() {
+    use ir::Value;
+    let (shader, warnings) = ir::compile("x.osl", PARAMETERS).unwrap();
+    assert!(warnings.is_empty());
+    assert_eq!((shader.name(), shader.metadata().len()), ("cloth", 1));
+    let defaults: Vec<_> = shader.params().iter().map(|p| p.default.clone()).collect();
+    assert_eq!(defaults[0], Some(Value::Color([1.0, 0.5, 0.0])));
+    assert_eq!(defaults[2], Some(Value::Float(0.3f32 * 0.3)));
+    assert_eq!(defaults[4], None, "depends on the point");
+    assert_eq!(shader.params()[1].meta("max"), Some(&Value::Float(1.0)));
+    let set = |set: &[(&str, Value)]| {
+        let set: Vec<_> = set.iter().map(|(name, value)| (name.to_string(), value.clone())).collect();
+        shader.specialise(&set)
+    };
+    let tree = |values: &[(&str, Value)]| shade(&set(values).unwrap());
+    assert_eq!(tree(&[]), "mul(1 0.5 0, oren_nayar(N=0 0 1, sigma=0.09))");
+    assert_eq!(tree(&[("r", Value::Int(2)), ("tint", Value::Int(1))]), "oren_nayar(N=0 0 1, sigma=4)");
+    let both = [("n", Value::Float(3.0)), ("word", Value::String("b".into())), ("tint", Value::Float(0.0))];
+    assert_eq!(tree(&both), "translucent(N=0 0 1)");
+    assert_eq!(set(&[("r", Value::Float(2.0))]).unwrap().warnings[0].code, "W0503");
+    assert_eq!(set(&[("r", Value::Float(f32::NAN))]).unwrap().warnings[0].code, "W0503");
+    let unknown = set(&[("tnt", Value::Int(1)), ("n", Value::Float(0.5))]).unwrap_err();
+    assert_eq!(unknown.iter().map(|d| d.code).collect::<Vec<_>>(), ["E0401", "E0402"]);
+    assert_eq!(unknown[0].help, ["did you mean `tint`?"]);
+}
+
+#[test]
+fn only_what_is_needed_is_kept() {
+    let needs = |source: &str| {
+        let program = program(source);
+        let globals: Vec<_> = program.globals().iter().map(|g| g.name()).collect();
+        (program.is_constant(), globals.join(" "), program.sites().len())
+    };
+    assert_eq!(needs("float x = u; Ci = diffuse(N);"), (true, "N".to_owned(), 1));
+    assert_eq!(needs("normal n = N; vector t = dPdu; Ci = diffuse(n);"), (true, "N".to_owned(), 1));
+    assert_eq!(needs("Ci = diffuse(-N);"), (false, "N".to_owned(), 1));
+    assert_eq!(needs("Ci = u * diffuse(N);"), (false, "N u".to_owned(), 1));
+    assert_eq!(needs("Ci = diffuse(N); Ci = translucent(Ng);"), (true, "Ng".to_owned(), 1));
+    assert_eq!(needs("Ci = 0 * translucent(N) + diffuse(N) * color(0, -1, 0);"), (true, String::new(), 0));
+    assert_eq!(needs("if (0) Ci = diffuse(N); else if (u > 2) ; "), (true, String::new(), 0));
+    let program = program("Ci = oren_nayar(N, 0.5) + oren_nayar(N, u);");
+    assert_eq!(program.sites()[0].values, [None, None, None, Some(0.5)]);
+    assert_eq!(program.sites()[1].values, [None; 4]);
+}
 
 fn survives(text: &str) {
     match ir::compile("test.osl", text) {
