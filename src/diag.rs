@@ -5,7 +5,8 @@
 //! panics, whatever the spans, and its cost and its output do not grow with the length of a source line.
 
 use crate::span::{Source, Span};
-use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
+use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet, Title};
+use std::ops::Range;
 
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -110,16 +111,11 @@ impl Diagnostic {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
         };
-        let at = source.line_column(self.span.start as usize);
-        let origin = Origin::path(source.name.as_str()).line(at.line).char_column(at.column);
-        let mut group = level.primary_title(clip(&self.message)).id(self.code).element(origin);
-        for window in self.windows(source) {
-            let marks = window.marks.into_iter().map(|mark| {
-                let kind = if mark.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
-                kind.span(mark.range).label(Some(clip(mark.text)).filter(|t| !t.is_empty()))
-            });
-            group = group.element(Snippet::source(window.text).line_start(window.line).annotations(marks));
-        }
+        let group = level.primary_title(clip(&self.message)).id(self.code);
+        let group = match self.excerpt(source) {
+            Some(snippet) => group.element(snippet),
+            None => self.windowed(source, group),
+        };
         let group = self.help.iter().fold(group, |group, help| group.element(Level::HELP.message(clip(help))));
         let renderer = if color { Renderer::styled() } else { Renderer::plain() };
         let mut text = renderer.render(&[group]);
@@ -127,29 +123,69 @@ impl Diagnostic {
         text
     }
 
-    /// The lines to show, the primary one first.
-    fn windows<'a>(&'a self, source: &Source) -> Vec<Window<'a>> {
-        let mut windows: Vec<Window> = Vec::new();
+    /// The places with what to write beside them, the primary one first.
+    fn places<'a>(&'a self, source: &Source) -> Vec<Mark<'a>> {
         let primary = std::iter::once((self.span, self.note.as_str(), true));
         let labels = self.labels.iter().take(MAX_LABELS).map(|l| (l.span, l.text.as_str(), false));
-        for (span, text, primary) in primary.chain(labels) {
-            let range = source.floor(span.start as usize)..source.floor(span.end as usize);
-            let line = source.line_column(range.start).line;
-            let shown = windows.iter().position(|w| w.line == line && w.covers(&range));
+        let mark = |(span, text, primary): (Span, &'a str, bool)| {
+            let start = source.floor(span.start as usize);
+            // One line each: what goes on is clear from where it begins.
+            let end = source.floor(span.end as usize).clamp(start, source.line_range(start).end);
+            Mark { range: start..end, text, primary }
+        };
+        primary.chain(labels).map(mark).collect()
+    }
+
+    /// All places in one piece of source, if it is short enough to show as it is.
+    fn excerpt<'a>(&'a self, source: &'a Source) -> Option<Snippet<'a, Annotation<'a>>> {
+        let places = self.places(source);
+        let lines = places.iter().map(|mark| source.line_range(mark.range.start));
+        let (mut start, mut end) = (usize::MAX, 0);
+        for line in lines {
+            if line.len() > MAX_LINE {
+                return None;
+            }
+            (start, end) = (start.min(line.start), end.max(line.end));
+        }
+        let text = source.text.get(start..end).filter(|text| text.len() <= MAX_EXCERPT)?;
+        let plain = |c: char| !c.is_control() || matches!(c, '\n' | '\t');
+        if text.lines().any(|line| line.len() > MAX_LINE) || !text.chars().all(plain) {
+            return None;
+        }
+        let line = source.line_column(start).line;
+        let marks = places.into_iter().map(|mark| mark.annotation(start));
+        Some(Snippet::source(text).path(source.name.as_str()).line_start(line).annotations(marks))
+    }
+
+    /// Each place in a window of its own.
+    fn windowed<'a>(&'a self, source: &'a Source, group: Title<'a>) -> Group<'a> {
+        let at = source.line_column(self.span.start as usize);
+        let origin = Origin::path(source.name.as_str()).line(at.line).char_column(at.column);
+        let mut windows: Vec<Window> = Vec::new();
+        for mark in self.places(source) {
+            let line = source.line_column(mark.range.start).line;
+            let shown = windows.iter().position(|w| w.line == line && w.covers(&mark.range));
             let index = shown.unwrap_or_else(|| {
-                windows.push(Window::around(source, line, &range));
+                windows.push(Window::around(source, line, &mark.range));
                 windows.len() - 1
             });
-            windows[index].mark(&range, text, primary);
+            windows[index].mark(mark);
         }
-        windows
+        windows.into_iter().fold(group.element(origin), |group, window| {
+            let marks = window.marks.into_iter().map(|mark| mark.annotation(0));
+            group.element(Snippet::source(window.text).line_start(window.line).annotations(marks))
+        })
     }
 }
 
-/// How much of a line is shown on each side of the place in question.
+/// How much of a long line is shown on each side of the place in question.
 const MARGIN: usize = 80;
 /// How much of the place itself is underlined.
 const MAX_UNDERLINE: usize = 80;
+/// A line longer than this is shown in part.
+const MAX_LINE: usize = 240;
+/// The longest piece of source that is handed to the renderer.
+const MAX_EXCERPT: usize = 64 << 10;
 /// How many secondary places a message shows.
 const MAX_LABELS: usize = 6;
 /// The longest text a message quotes.
@@ -160,46 +196,58 @@ struct Window<'a> {
     line: usize,
     text: String,
     /// Bytes of the source that `text` shows.
-    shown: std::ops::Range<usize>,
+    shown: Range<usize>,
     /// Length of the dots in front.
     lead: usize,
     marks: Vec<Mark<'a>>,
 }
 
 struct Mark<'a> {
-    range: std::ops::Range<usize>,
+    range: Range<usize>,
     text: &'a str,
     primary: bool,
 }
 
+impl<'a> Mark<'a> {
+    /// For a text that begins at byte `start`.
+    fn annotation(self, start: usize) -> Annotation<'a> {
+        let kind = if self.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
+        let text = Some(clip(self.text)).filter(|t| !t.is_empty());
+        kind.span(self.range.start - start..self.range.end - start).label(text)
+    }
+}
+
 impl<'a> Window<'a> {
-    fn around(source: &Source, line: usize, place: &std::ops::Range<usize>) -> Window<'a> {
+    fn around(source: &Source, line: usize, place: &Range<usize>) -> Window<'a> {
         let whole = source.line_range(place.start);
         let start = source.floor(place.start.saturating_sub(MARGIN)).max(whole.start);
         let end = source.floor(place.end.min(place.start + MAX_UNDERLINE) + MARGIN).clamp(start, whole.end);
         let (before, after) = (start > whole.start, end < whole.end);
         let dots = |show: bool| if show { "..." } else { "" };
-        // Control characters would upset the terminal and the columns alike; tabs are the renderer's business.
-        let body = source.text[start..end].chars().map(|c| if c.is_control() && c != '\t' { ' ' } else { c });
-        let body = body.collect::<String>();
-        // Only controls of two bytes shrink; where that happened, marks would be off, so the body is kept as it was.
-        let body = if body.len() == end - start { body } else { source.text[start..end].replace('\r', " ") };
+        // Control characters would upset the terminal; as many bytes of blanks keep the marks in place.
+        let mut body = String::new();
+        for c in source.text[start..end].chars() {
+            match c.is_control() && c != '\t' {
+                true => body.extend(std::iter::repeat_n(' ', c.len_utf8())),
+                false => body.push(c),
+            }
+        }
         let text = format!("{}{body}{}", dots(before), dots(after));
         Window { line, text, shown: start..end, lead: dots(before).len(), marks: Vec::new() }
     }
 
-    fn covers(&self, place: &std::ops::Range<usize>) -> bool {
+    fn covers(&self, place: &Range<usize>) -> bool {
         self.shown.start <= place.start && place.start <= self.shown.end
     }
 
-    fn mark(&mut self, place: &std::ops::Range<usize>, text: &'a str, primary: bool) {
-        let start = place.start - self.shown.start + self.lead;
-        let end = (place.end.min(place.start + MAX_UNDERLINE)).clamp(place.start, self.shown.end) - self.shown.start;
-        let mut end = end + self.lead;
+    fn mark(&mut self, mark: Mark<'a>) {
+        let start = mark.range.start - self.shown.start + self.lead;
+        let end = mark.range.end.min(mark.range.start + MAX_UNDERLINE).clamp(mark.range.start, self.shown.end);
+        let mut end = end - self.shown.start + self.lead;
         while !self.text.is_char_boundary(end) {
             end -= 1;
         }
-        self.marks.push(Mark { range: start..end.max(start), text, primary });
+        self.marks.push(Mark { range: start..end.max(start), ..mark });
     }
 }
 

@@ -130,19 +130,14 @@ impl<'a> Lower<'a> {
         let expr = self.body.expr(id);
         match expr.kind {
             ExprKind::Var(var) => self.place_var(var, placed),
-            ExprKind::Const(cells) => {
-                let n = expr.ty.cells();
-                if !self.constants.contains_key(&(n, cells)) {
-                    let reg = self.fixed(cells, n);
-                    self.constants.insert((n, cells), reg);
-                }
+            ExprKind::Const(cells) if !self.constants.contains_key(&(expr.ty.cells(), cells)) => {
+                let reg = self.fixed(cells, expr.ty.cells());
+                self.constants.insert((expr.ty.cells(), cells), reg);
             }
-            ExprKind::Global(global) => {
-                if !self.globals.contains_key(&global) {
-                    let reg = self.fixed([0; 3], global.ty().cells());
-                    self.globals.insert(global, reg);
-                    self.code.push(Instr::Global { global, dst: reg });
-                }
+            ExprKind::Global(global) if !self.globals.contains_key(&global) => {
+                let reg = self.fixed([0; 3], global.ty().cells());
+                self.globals.insert(global, reg);
+                self.code.push(Instr::Global { global, dst: reg });
             }
             _ => {}
         }

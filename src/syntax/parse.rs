@@ -44,7 +44,8 @@ pub fn parse(text: &str) -> Result<Ast, Vec<Diagnostic>> {
             }
         };
         errors.push(recover::explain(&blanked, at, &expected));
-        if !recover::blank_statement(&mut blanked, at) {
+        let only_before = recover::missing_semicolon(&blanked, at, &expected);
+        if !recover::blank_statement(&mut blanked, at, only_before) {
             break;
         }
     }
@@ -78,6 +79,8 @@ fn expectations(rules: &[Rule]) -> Vec<&'static str> {
             found.push(word);
         }
     }
+    // A name is a value wherever both fit.
+    found.retain(|word| *word != "a name" || !rules.contains(&Rule::number));
     found
 }
 
@@ -446,7 +449,7 @@ impl Builder {
             }
             (_, None) => {
                 let sym = self.name(&name);
-                self.ast.push(ExprKind::Name(sym), at)
+                self.ast.push(ExprKind::Name(sym), name_at)
             }
         }
     }

@@ -310,12 +310,15 @@ fn pairs(open: u8, close: u8) -> bool {
 }
 
 fn unpaired(close: u8, at: usize, open: &Frame) -> Diagnostic {
-    let message = format!("this `{}` closes nothing", close as char);
-    let d = Diagnostic::error("E0102", Span::new(at, at + 1), message);
-    match open.open {
-        0 => d,
-        c => d.label(Span::new(open.at, open.at + 1), format!("this `{}` is still open", c as char)),
-    }
+    let span = Span::new(at, at + 1);
+    let partner = match open.open {
+        b'(' => ')',
+        b'[' => ']',
+        b'{' => '}',
+        _ => return Diagnostic::error("E0102", span, format!("this `{}` closes nothing", close as char)),
+    };
+    let d = Diagnostic::error("E0102", span, format!("expected `{partner}` before this `{}`", close as char));
+    d.label(Span::new(open.at, open.at + 1), format!("this `{}` is still open", open.open as char))
 }
 
 fn string_end(bytes: &[u8], start: usize) -> usize {

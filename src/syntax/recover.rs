@@ -55,6 +55,12 @@ const UNSUPPORTED: &[(&str, &str)] = &[
     ("void", "function definitions are not supported"),
 ];
 
+/// Whether a statement ended before `at` without its `;`: something new begins on another line, or nothing at all.
+pub fn missing_semicolon(text: &str, at: usize, expected: &[&str]) -> bool {
+    let before = text[..at].trim_end().len();
+    expected.contains(&"`;`") && before > 0 && (text[before..at].contains('\n') || token(text, at).is_empty())
+}
+
 /// Says what stands at `at` and what could have stood there.
 pub fn explain(text: &str, at: usize, expected: &[&str]) -> Diagnostic {
     let range = statement_around(text, at);
@@ -63,8 +69,7 @@ pub fn explain(text: &str, at: usize, expected: &[&str]) -> Diagnostic {
     }
     let before = text[..at].trim_end().len();
     let found = token(text, at);
-    let next_line = text[before..at].contains('\n') || found.is_empty();
-    if expected.contains(&"`;`") && next_line && before > 0 {
+    if missing_semicolon(text, at, expected) {
         let span = Span::new(before - last_char(&text[..before]), before);
         return Diagnostic::error("E0107", span, "a `;` is missing after this").note("expected `;` here");
     }
@@ -85,15 +90,19 @@ fn unsupported(text: &str, range: &Range<usize>, at: usize) -> Option<Diagnostic
     if let Some((_, message)) = UNSUPPORTED.iter().find(|(w, _)| *w == word) {
         return Some(Diagnostic::error("E0109", Span::new(start, start + word.len()), *message));
     }
+    let before = text[..at].trim_end();
+    if before.ends_with("++") || before.ends_with("--") {
+        let span = Span::new(before.len() - 2, before.len());
+        let d = Diagnostic::error("E0109", span, "`++` and `--` are not supported");
+        return Some(d.help("write `x += 1` or `x -= 1`"));
+    }
     let typed = super::ast::TypeName::simple(word).is_some() || word == "closure";
     let message = match token(text, at) {
         "[" if typed => "arrays are not supported",
         "(" if typed => "function definitions are not supported",
-        "++" | "--" => "`++` and `--` are not supported",
         _ => return None,
     };
-    let d = Diagnostic::error("E0109", Span::new(at, at + token(text, at).len()), message);
-    Some(if message.starts_with("`++`") { d.help("write `x += 1` or `x -= 1`") } else { d })
+    Some(Diagnostic::error("E0109", Span::new(at, at + token(text, at).len()), message))
 }
 
 /// The word or sign at `at`; empty at the end.
@@ -103,8 +112,6 @@ fn token(text: &str, at: usize) -> &str {
     let end = match rest.chars().next() {
         None => 0,
         Some('"') => rest[1..].find('"').map_or(rest.len(), |i| i + 2),
-        Some('+') if rest.starts_with("++") => 2,
-        Some('-') if rest.starts_with("--") => 2,
         Some(c) if word == 0 => c.len_utf8(),
         Some(_) => word,
     };
@@ -115,9 +122,12 @@ fn last_char(text: &str) -> usize {
     text.chars().next_back().map_or(0, char::len_utf8)
 }
 
-/// Blanks the statement around `at`; false if there is nothing left to gain from that.
-pub fn blank_statement(text: &mut String, at: usize) -> bool {
-    let range = statement_around(text, at);
+/// Blanks the statement around `at`, or only what of it comes before `at`; false if nothing is gained by that.
+pub fn blank_statement(text: &mut String, at: usize, only_before: bool) -> bool {
+    let mut range = statement_around(text, at);
+    if only_before {
+        range.end = at.max(range.start);
+    }
     let statement = &text[range.clone()];
     let word = token(statement, statement.len() - statement.trim_start().len());
     if statement.trim().is_empty() || matches!(word, "surface" | "shader" | "displacement" | "volume" | "light" | "}") {

@@ -57,7 +57,7 @@ impl Checker<'_> {
             ast::ExprKind::Assign(op, target, value)
                 if statement_level.binary_search_by_key(&id.0, |e| e.0).is_ok() =>
             {
-                self.assignment(op, target, value, span)
+                self.assignment(op, target, value, span, statement_level.last() == Some(&id))
             }
             ast::ExprKind::Assign(..) => {
                 let d = Diagnostic::error("E0109", span, "an assignment inside an expression is not supported");
@@ -431,8 +431,16 @@ impl Checker<'_> {
         }
     }
 
-    fn assignment(&mut self, op: Option<BinaryOp>, target: ast::ExprId, value: ast::ExprId, span: Span) -> Typed {
-        let (base, component) = match self.ast.expr(target).kind {
+    /// `target = value`; `last` if nothing else is assigned the result.
+    fn assignment(
+        &mut self,
+        op: Option<BinaryOp>,
+        target: ast::ExprId,
+        value: ast::ExprId,
+        span: Span,
+        last: bool,
+    ) -> Typed {
+        let (base, index) = match self.ast.expr(target).kind {
             ast::ExprKind::Index(base, index) => (base, Some(index)),
             ast::ExprKind::Field(base, ..) => (base, Some(target)),
             _ => (target, None),
@@ -440,27 +448,47 @@ impl Checker<'_> {
         let Some((var, ty)) = self.target(base) else { return self.poison() };
         self.assigned_ci |= var == VarId::CI;
         let old = self.push(ExprKind::Var(var), ty, self.span_of(base));
-        let (slot, slot_ty) = match component {
-            None => (old, ty),
-            Some(at) => {
-                let Some(index) = self.component_index(ty, target, at) else { return self.poison() };
-                let slot = self.op(Op::Component, &[old.id, index], Ty::Float, span);
-                (Typed { id: index, ty: slot.ty }, Ty::Float)
-            }
+        let Some(at) = index else {
+            let new = self.combined(op, old, target, value, span);
+            let new = self.initial(new, ty, self.span_of(value), ast::Root { first: value.0, root: value });
+            self.assign(var, new);
+            return self.push(ExprKind::Var(var), ty, span);
         };
-        let mut new = self.of(value);
-        if let Some(op) = op {
-            let left =
-                if component.is_some() { self.op(Op::Component, &[old.id, slot.id], Ty::Float, span) } else { old };
-            new = self.binary(op, left, new, span, (target, value));
+        let Some(index) = self.component_index(ty, target, at) else { return self.poison() };
+        let known = match self.body.expr(index).kind {
+            ExprKind::Const(cells) => Some(cells[0] as i32),
+            _ if !last => {
+                let d = Diagnostic::error("E0109", self.span_of(target), "this cannot be part of a chain");
+                return self.error(d.help("assign in two statements"));
+            }
+            _ => None,
+        };
+        let slot = self.op(Op::Component, &[old.id, index], Ty::Float, span);
+        let new = self.combined(op, slot, target, value, span);
+        let new = self.initial(new, Ty::Float, self.span_of(value), ast::Root { first: value.0, root: value });
+        let whole = self.op(Op::Insert, &[old.id, index, new], ty, span);
+        self.assign(var, whole.id);
+        let now = self.push(ExprKind::Var(var), ty, span);
+        match known {
+            Some(i) => {
+                let i = self.int(i, span);
+                self.op(Op::Component, &[now.id, i.id], Ty::Float, span)
+            }
+            None => now,
         }
-        let run = ast::Root { first: value.0, root: value };
-        let mut new = self.initial(new, slot_ty, self.span_of(value), run);
-        if component.is_some() {
-            new = self.op(Op::Insert, &[old.id, slot.id, new], ty, span).id;
-        }
-        self.assign(var, new);
-        self.push(ExprKind::Var(var), ty, span)
+    }
+
+    /// What `op=` assigns: the old value and the new one under the operator.
+    fn combined(
+        &mut self,
+        op: Option<BinaryOp>,
+        old: Typed,
+        target: ast::ExprId,
+        value: ast::ExprId,
+        span: Span,
+    ) -> Typed {
+        let new = self.of(value);
+        op.map_or(new, |op| self.binary(op, old, new, span, (target, value)))
     }
 
     /// The index that an assignment to a component names.
