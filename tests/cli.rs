@@ -172,7 +172,7 @@ fn parameters_are_set_by_name() {
 fn mistakes_in_scripts_exit_1_with_the_place() {
     for (script, expected) in [
         ("Ci = difuse(N);", "diffuse"),
-        ("Ci = diffuse(N)", "1:16"),
+        ("Ci = diffuse(N)", "1:15"),
         ("Ci = diffuse(N) * diffuse(N);", "1:"),
         ("Ci = diffuse(N;", "1:"),
         ("float x = \"a\"; Ci = x * diffuse(N);", "1:"),

@@ -1,7 +1,7 @@
 //! `overcoat tree`.
 
 use super::output::{number, numbers};
-use super::{Global, Outcome, output};
+use super::{Failure, Global, Outcome, output};
 use crate::closure::{ClosureTree, Node, NodeId};
 use crate::globals::Globals;
 use crate::lobes::LobeKind;
@@ -10,9 +10,18 @@ use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Deeper documents overflow the stack of those who write and read them.
+const MAX_DEPTH: u32 = 1000;
+
 pub fn run(global: &Global, file: &Path) -> Outcome {
     let material = global.material(file, &[])?;
     let tree = material.tree(&Globals::default())?;
+    let depth = tree.size(tree.root()).depth;
+    if depth > MAX_DEPTH {
+        return Err(Failure::Script(format!(
+            "error: the closure tree is {depth} nodes deep; up to {MAX_DEPTH} can be printed"
+        )));
+    }
     if global.json {
         return output::json(&json!({ "shader": material.name(), "closure": node(&tree, tree.root()) }));
     }

@@ -53,6 +53,22 @@ pub struct Size {
     pub lobes: u32,
     /// Layers on the longest way down, saturating.
     pub layers: u16,
+    /// Nodes on the longest way down, where a sum of sums counts as one; saturating.
+    pub depth: u32,
+}
+
+impl Size {
+    fn beside(self, o: Size) -> Size {
+        Size {
+            lobes: self.lobes.saturating_add(o.lobes),
+            layers: self.layers.max(o.layers),
+            depth: self.depth.max(o.depth),
+        }
+    }
+
+    fn below(self, nodes: u32) -> Size {
+        Size { depth: self.depth.saturating_add(nodes), ..self }
+    }
 }
 
 /// Most lobes a tree may come to.
@@ -127,6 +143,9 @@ impl ClosureTree {
             self.zero()
         } else if weight == [1.0; 3] {
             c
+        } else if let Node::Mul(inner, c) = self.node(c) {
+            // Both are sane already, and so is their product: one node in place of two.
+            self.mul(std::array::from_fn(|i| weight[i] * inner[i]), c)
         } else {
             self.push(Node::Mul(weight, c))
         }
@@ -209,17 +228,17 @@ impl ClosureTree {
 
     fn push(&mut self, node: Node) -> NodeId {
         let id = NodeId(self.nodes.len() as u32);
-        let both = |a: NodeId, b: NodeId| {
-            let (a, b) = (self.size(a), self.size(b));
-            Size { lobes: a.lobes.saturating_add(b.lobes), layers: a.layers.max(b.layers) }
-        };
         let size = match node {
             Node::Zero => Size::default(),
-            Node::Lobe { .. } => Size { lobes: 1, layers: 0 },
-            Node::Mul(_, c) => self.size(c),
-            Node::Add(a, b) => both(a, b),
+            Node::Lobe { .. } => Size { lobes: 1, layers: 0, depth: 1 },
+            Node::Mul(_, c) => self.size(c).below(1),
+            Node::Add(a, b) => {
+                let is_sum = |id| matches!(self.node(id), Node::Add(..));
+                let part = |id| self.size(id).below(u32::from(!is_sum(id)));
+                part(a).beside(part(b))
+            }
             Node::Layer { top, base } => {
-                let size = both(top, base);
+                let size = self.size(top).beside(self.size(base)).below(1);
                 Size { layers: size.layers.saturating_add(1), ..size }
             }
         };

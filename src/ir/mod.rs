@@ -16,7 +16,7 @@ mod shader;
 mod types;
 
 pub use body::GlobalVar;
-pub use program::{MAX_LAYERS, MAX_LOBES, Program, ShadeError, Site};
+pub use program::{Program, ShadeError, Site};
 pub use shader::{CheckedShader, ParamDecl, Value};
 pub use types::Ty;
 

@@ -1,53 +1,21 @@
 //! The register program that a specialised shader is, and its interpreter.
 //!
 //! In: a shading point. Out: a closure tree. Typical programs run without touching the heap. Closures are shared, so a
-//! few instructions can describe a tree of any size; each closure register therefore counts the lobes and layers it
-//! stands for, and going beyond the budget is an error rather than a surprise further down.
+//! few instructions can describe a tree of any size; going beyond the tree's budget is an error rather than a surprise
+//! further down.
 
 use super::body::{Cells, GlobalVar, Op};
 use super::builtins::{BUILTINS, MAX_ARGS};
 use super::ops;
 use crate::Globals;
-use crate::closure::ClosureTree;
-use crate::closure::tree::NodeId;
+use crate::closure::{ClosureTree, NodeId, TreeError};
 use crate::diag::Diagnostic;
 use crate::lobes::LobeKind;
 use crate::span::Span;
 use smallvec::SmallVec;
 
-/// How many lobes a tree may have when every shared part is counted as often as it is used.
-pub const MAX_LOBES: u32 = 1 << 20;
-/// How many layers may lie over one another.
-pub const MAX_LAYERS: u32 = 256;
-
 /// Shading went beyond a budget.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShadeError {
-    /// More than [`MAX_LOBES`] lobes.
-    TooManyLobes,
-    /// More than [`MAX_LAYERS`] layers over one another.
-    TooManyLayers,
-}
-
-impl std::fmt::Display for ShadeError {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            ShadeError::TooManyLobes => write!(f, "the closure has more than {MAX_LOBES} lobes"),
-            ShadeError::TooManyLayers => write!(f, "the closure has more than {MAX_LAYERS} layers over one another"),
-        }
-    }
-}
-
-impl std::error::Error for ShadeError {}
-
-impl From<crate::closure::TreeError> for ShadeError {
-    fn from(e: crate::closure::TreeError) -> ShadeError {
-        match e {
-            crate::closure::TreeError::TooManyLobes => ShadeError::TooManyLobes,
-            crate::closure::TreeError::TooDeep => ShadeError::TooManyLayers,
-        }
-    }
-}
+pub type ShadeError = TreeError;
 
 /// One place in a program that makes a lobe.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,16 +115,6 @@ pub struct Program {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// A closure under construction.
-#[derive(Clone, Copy)]
-struct Closure {
-    node: NodeId,
-    /// Lobes of the tree it stands for.
-    lobes: u32,
-    /// Layers over one another.
-    layers: u32,
-}
-
 impl Program {
     /// Whether the tree is the same at every point, up to the directions that lobes take as their normals and tangents
     /// straight from the globals.
@@ -192,8 +150,7 @@ impl Program {
         tree.clear();
         let mut cells: SmallVec<[u32; 96]> = SmallVec::from_slice(&self.image);
         cells.resize(self.registers, 0);
-        let black = Closure { node: tree.zero(), lobes: 0, layers: 0 };
-        let mut closures: SmallVec<[Closure; 16]> = SmallVec::from_elem(black, self.closures);
+        let mut closures: SmallVec<[NodeId; 16]> = SmallVec::from_elem(tree.zero(), self.closures);
         let mut at = 0;
         while let Some(instr) = self.code.get(at) {
             at += 1;
@@ -222,23 +179,17 @@ impl Program {
                     let slots = &self.args[args as usize..args as usize + kind.spec().slot_count()];
                     let values: SmallVec<[f32; 32]> =
                         slots.iter().map(|reg| f32::from_bits(cells[*reg as usize])).collect();
-                    closures[dst as usize] = Closure { node: tree.lobe(kind, site, &values), lobes: 1, layers: 0 };
+                    closures[dst as usize] = tree.lobe(kind, site, &values);
                 }
                 Instr::AddC { dst, a, b } => {
-                    let (a, b) = (closures[a as usize], closures[b as usize]);
-                    let node = tree.add(a.node, b.node);
-                    closures[dst as usize] = joined(node, a, b, 0).map_err(|e| blacken(tree, e))?;
+                    closures[dst as usize] = tree.add(closures[a as usize], closures[b as usize]);
                 }
                 Instr::MulC { dst, weight, closure } => {
-                    let (weight, c) = (read(&cells, weight, 3).map(f32::from_bits), closures[closure as usize]);
-                    let node = tree.mul(weight, c.node);
-                    closures[dst as usize] = if node == tree.zero() { black } else { Closure { node, ..c } };
+                    let weight = read(&cells, weight, 3).map(f32::from_bits);
+                    closures[dst as usize] = tree.mul(weight, closures[closure as usize]);
                 }
                 Instr::Layer { dst, top, base } => {
-                    let (top, base) = (closures[top as usize], closures[base as usize]);
-                    let node = tree.layer(top.node, base.node);
-                    let both = top.node != tree.zero() && base.node != tree.zero();
-                    closures[dst as usize] = joined(node, top, base, both.into()).map_err(|e| blacken(tree, e))?;
+                    closures[dst as usize] = tree.layer(closures[top as usize], closures[base as usize]);
                 }
                 Instr::Jump { to } => at = to as usize,
                 Instr::JumpIfZero { condition, to } => {
@@ -253,8 +204,8 @@ impl Program {
                 }
             }
         }
-        tree.set_root(closures[self.ci as usize].node);
-        Ok(())
+        tree.set_root(closures[self.ci as usize]);
+        tree.within_budget().inspect_err(|_| tree.set_root(tree.zero()))
     }
 
     fn call(&self, cells: &[u32], function: u16, width: u8, count: u8, args: u32) -> Cells {
@@ -265,23 +216,6 @@ impl Program {
         }
         BUILTINS[function as usize].apply(width as usize, &values[..count as usize])
     }
-}
-
-fn joined(node: NodeId, a: Closure, b: Closure, layer: u32) -> Result<Closure, ShadeError> {
-    let lobes = a.lobes.saturating_add(b.lobes);
-    let layers = a.layers.max(b.layers) + layer;
-    if lobes > MAX_LOBES {
-        return Err(ShadeError::TooManyLobes);
-    }
-    if layers > MAX_LAYERS {
-        return Err(ShadeError::TooManyLayers);
-    }
-    Ok(Closure { node, lobes, layers })
-}
-
-fn blacken(tree: &mut ClosureTree, error: ShadeError) -> ShadeError {
-    tree.clear();
-    error
 }
 
 /// Up to `n` cells; what lies beyond the registers reads as zero.
