@@ -5,7 +5,7 @@
 //! name stands for or which types fit; that is [`crate::ir`].
 
 pub mod ast;
-pub mod parse;
+mod parse;
 pub mod preprocess;
 mod recover;
 
