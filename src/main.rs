@@ -1,1 +1,5 @@
-fn main() {}
+//! The `overcoat` program; everything it does is in [`overcoat::cli`].
+
+fn main() -> std::process::ExitCode {
+    overcoat::cli::main()
+}

@@ -1,11 +1,9 @@
-//! Directional albedos: curves a layer may rely on because they never fall below the truth.
+//! Directional albedos: tables that are baked once per material and never fall below the truth.
+//!
+//! In: a lobe's f as a plain function, in double precision. Out: [`AlbedoCurve`], read in shading. Knows no lobe by
+//! name.
 
-/// What a lobe asks to be baked.
-#[derive(Clone, Debug)]
-pub struct CurveSpec {}
+pub mod curve;
+pub mod quadrature;
 
-/// Albedo over the cosine.
-#[derive(Clone, Debug)]
-pub struct AlbedoCurve<S> {
-    pub x: Vec<S>,
-}
+pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};

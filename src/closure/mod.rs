@@ -1,7 +1,11 @@
-//! From a closure tree to a BSDF. Never sees a script: trees come from [`crate::ir`] or from code.
+//! From a closure tree to a BSDF. Never sees a script: trees come from the interpreter or from code.
 
 pub mod bsdf;
+pub mod flatten;
+pub mod layer;
 pub mod tree;
 
 pub use bsdf::{Bsdf, Eval, Sample, SampleFlags};
-pub use tree::{ClosureTree, Node, NodeId};
+pub use flatten::{Curves, Layering, flatten};
+pub use layer::{LayeringRule, TintRule};
+pub use tree::{ClosureTree, Node, NodeId, Size, TreeError};

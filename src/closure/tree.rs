@@ -40,9 +40,61 @@ pub const MAX_WEIGHT: f32 = 1e30;
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
     nodes: SmallVec<[Node; 20]>,
+    sizes: SmallVec<[Size; 20]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
 }
+
+/// How much a node comes to when it is written out in full: a node may be used twice, so a tree of sixty nodes can
+/// stand for 2⁶⁰ lobes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
+    /// Lobes, saturating.
+    pub lobes: u32,
+    /// Layers on the longest way down, saturating.
+    pub layers: u16,
+    /// Nodes on the longest way down, where a sum of sums counts as one; saturating.
+    pub depth: u32,
+}
+
+impl Size {
+    fn beside(self, o: Size) -> Size {
+        Size {
+            lobes: self.lobes.saturating_add(o.lobes),
+            layers: self.layers.max(o.layers),
+            depth: self.depth.max(o.depth),
+        }
+    }
+
+    fn below(self, nodes: u32) -> Size {
+        Size { depth: self.depth.saturating_add(nodes), ..self }
+    }
+}
+
+/// Most lobes a tree may come to.
+pub const MAX_LOBES: u32 = 1 << 20;
+/// Most layers on any way from the root to a lobe.
+pub const MAX_LAYERS: u16 = 256;
+
+/// A tree that goes beyond a budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TreeError {
+    /// More than [`MAX_LOBES`] lobes.
+    TooManyLobes,
+    /// Layers nested deeper than [`MAX_LAYERS`].
+    TooDeep,
+}
+
+impl std::fmt::Display for TreeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            TreeError::TooManyLobes => write!(f, "the closure comes to more than {MAX_LOBES} lobes"),
+            TreeError::TooDeep => write!(f, "layers are nested deeper than {MAX_LAYERS}"),
+        }
+    }
+}
+
+impl std::error::Error for TreeError {}
 
 impl Default for ClosureTree {
     fn default() -> Self {
@@ -53,14 +105,16 @@ impl Default for ClosureTree {
 impl ClosureTree {
     /// A black tree.
     pub fn new() -> Self {
-        let mut nodes = SmallVec::new();
-        nodes.push(Node::Zero);
-        ClosureTree { nodes, slots: SmallVec::new(), root: NodeId(0) }
+        let mut tree =
+            ClosureTree { nodes: SmallVec::new(), sizes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0) };
+        tree.push(Node::Zero);
+        tree
     }
 
     /// Back to black, keeping what memory there is.
     pub fn clear(&mut self) {
         self.nodes.truncate(1);
+        self.sizes.truncate(1);
         self.slots.clear();
         self.root = NodeId(0);
     }
@@ -89,6 +143,9 @@ impl ClosureTree {
             self.zero()
         } else if weight == [1.0; 3] {
             c
+        } else if let Node::Mul(inner, c) = self.node(c) {
+            // Both are sane already, and so is their product: one node in place of two.
+            self.mul(std::array::from_fn(|i| weight[i] * inner[i]), c)
         } else {
             self.push(Node::Mul(weight, c))
         }
@@ -144,9 +201,49 @@ impl ClosureTree {
         &self.slots[start as usize..start as usize + kind.spec().slot_count()]
     }
 
+    /// Every lobe node made: its site, kind and parameter block.
+    pub fn lobes(&self) -> impl Iterator<Item = (u32, LobeKind, &[f32])> {
+        self.nodes.iter().filter_map(|n| match *n {
+            Node::Lobe { kind, site, slots } => Some((site, kind, self.values(kind, slots))),
+            _ => None,
+        })
+    }
+
+    /// What a node comes to, written out.
+    pub fn size(&self, id: NodeId) -> Size {
+        self.sizes[id.index()]
+    }
+
+    /// Whether the tree is within [`MAX_LOBES`] and [`MAX_LAYERS`].
+    pub fn within_budget(&self) -> Result<(), TreeError> {
+        let size = self.size(self.root);
+        if size.layers > MAX_LAYERS {
+            Err(TreeError::TooDeep)
+        } else if size.lobes > MAX_LOBES {
+            Err(TreeError::TooManyLobes)
+        } else {
+            Ok(())
+        }
+    }
+
     fn push(&mut self, node: Node) -> NodeId {
         let id = NodeId(self.nodes.len() as u32);
+        let size = match node {
+            Node::Zero => Size::default(),
+            Node::Lobe { .. } => Size { lobes: 1, layers: 0, depth: 1 },
+            Node::Mul(_, c) => self.size(c).below(1),
+            Node::Add(a, b) => {
+                let is_sum = |id| matches!(self.node(id), Node::Add(..));
+                let part = |id| self.size(id).below(u32::from(!is_sum(id)));
+                part(a).beside(part(b))
+            }
+            Node::Layer { top, base } => {
+                let size = self.size(top).beside(self.size(base)).below(1);
+                Size { layers: size.layers.saturating_add(1), ..size }
+            }
+        };
         self.nodes.push(node);
+        self.sizes.push(size);
         id
     }
 }

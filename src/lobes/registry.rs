@@ -64,12 +64,14 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
-    /// Clamps one slot value to the declared range; NaN becomes the default (or the lower end without one).
+    /// A slot value as lobes read it: clamped to the declared range, whole where the type is; NaN becomes the default
+    /// (or the lower end without one).
     pub fn clamp(&self, slot: usize, value: f32) -> f32 {
         if value.is_nan() {
             return self.default.get(slot).copied().unwrap_or(if self.min.is_finite() { self.min } else { 0.0 });
         }
-        value.clamp(self.min, self.max)
+        let value = value.clamp(self.min, self.max);
+        if matches!(self.ty, ParamTy::Int | ParamTy::String) { value.trunc() } else { value }
     }
 }
 
@@ -88,8 +90,35 @@ pub struct LobeSpec {
 
 impl LobeSpec {
     /// Number of f32 slots of a parameter block.
-    pub fn slot_count(&self) -> usize {
-        self.params.iter().map(|p| p.ty.slots()).sum()
+    pub const fn slot_count(&self) -> usize {
+        let (mut slots, mut i) = (0, 0);
+        while i < self.params.len() {
+            slots += self.params[i].ty.slots();
+            i += 1;
+        }
+        slots
+    }
+
+    /// Where the lobe's own shading normal starts in its block: its first `normal` parameter.
+    pub const fn normal_slot(&self) -> Option<usize> {
+        self.first_slot(ParamTy::Normal)
+    }
+
+    /// Where the lobe's tangent starts in its block: its first `vector` parameter.
+    pub const fn tangent_slot(&self) -> Option<usize> {
+        self.first_slot(ParamTy::Vector)
+    }
+
+    const fn first_slot(&self, ty: ParamTy) -> Option<usize> {
+        let (mut at, mut i) = (0, 0);
+        while i < self.params.len() {
+            if self.params[i].ty as u8 == ty as u8 {
+                return Some(at);
+            }
+            at += self.params[i].ty.slots();
+            i += 1;
+        }
+        None
     }
 
     /// The first slot of the parameter called `name`.
@@ -244,7 +273,7 @@ macro_rules! closure {
                 class: $crate::lobes::registry::LobeClass::$class,
             };
 
-            #[allow(unused_assignments, unused_variables, unused_mut)]
+            #[allow(unused_assignments, unused_variables, unused_mut, non_snake_case)]
             fn from_slots(slots: &[f32]) -> Self {
                 let mut at = 0;
                 let mut index = 0;

@@ -285,6 +285,17 @@ impl Lift<f32> for F32x8 {
     }
 }
 
+impl Lift<F32x8> for F32x8 {
+    #[inline(always)]
+    fn lift(s: F32x8) -> Self {
+        s
+    }
+    #[inline(always)]
+    fn gather(table: &[F32x8], index: Self) -> Self {
+        F32x8(std::array::from_fn(|i| table[index.0[i] as usize].0[i]))
+    }
+}
+
 impl Lift<f32> for f32 {
     #[inline(always)]
     fn lift(s: f32) -> Self {

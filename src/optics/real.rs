@@ -15,6 +15,7 @@ pub trait Real:
     + Send
     + Sync
     + 'static
+    + Lift<Self>
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -88,7 +89,7 @@ pub trait Real:
 }
 
 /// One number type for a single value, as opposed to lanes: what a BSDF is built in.
-pub trait Scalar: Real<Mask = bool> + PartialOrd + Lift<Self> {
+pub trait Scalar: Real<Mask = bool> + PartialOrd + Default {
     fn to_f64(self) -> f64;
     fn to_f32(self) -> f32 {
         self.to_f64() as f32
@@ -97,7 +98,7 @@ pub trait Scalar: Real<Mask = bool> + PartialOrd + Lift<Self> {
 }
 
 /// Brings what a lobe stores into the type a formula is evaluated in: a lobe prepared in `f32` evaluates over lanes.
-pub trait Lift<S>: Real {
+pub trait Lift<S>: Sized {
     fn lift(s: S) -> Self;
     /// `table[index]` per lane; `index` holds whole numbers inside the table.
     fn gather(table: &[S], index: Self) -> Self;

@@ -11,12 +11,20 @@ pub struct V3<R> {
     pub z: R,
 }
 
-impl<R: Real> V3<R> {
+impl<T> V3<T> {
     #[inline(always)]
-    pub fn new(x: R, y: R, z: R) -> Self {
+    pub fn new(x: T, y: T, z: T) -> Self {
         V3 { x, y, z }
     }
 
+    /// `f` of each component.
+    #[inline(always)]
+    pub fn map<U>(self, f: impl Fn(T) -> U) -> V3<U> {
+        V3::new(f(self.x), f(self.y), f(self.z))
+    }
+}
+
+impl<R: Real> V3<R> {
     /// Brings a scalar vector into the evaluating type.
     #[inline(always)]
     pub fn lift<S: Real>(v: V3<S>) -> Self

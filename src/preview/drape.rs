@@ -234,7 +234,8 @@ fn tessellate(net: &Net, resolution: usize) -> Mesh {
     let mut triangles = Vec::with_capacity(2 * resolution * resolution);
     for v in 0..resolution {
         for u in 0..resolution {
-            let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| ((v + j) * (resolution + 1) + u + i) as u32);
+            let [a, b, c, d] =
+                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| ((v + j) * (resolution + 1) + u + i) as u32);
             triangles.push([a, b, d]);
             triangles.push([a, d, c]);
         }

@@ -116,7 +116,8 @@ impl<'w, S: Surface> Tracer<'w, S> {
             return false;
         };
         path.throughput *= Vec3::from_array(sample.weight);
-        if !(path.throughput.is_finite() && sample.wi.is_finite()) {
+        let wi = Vec3::from(sample.wi);
+        if !(path.throughput.is_finite() && wi.is_finite()) {
             // Ends here, and is counted where the sample reaches the film.
             path.radiance = Vec3::NAN;
             return false;
@@ -126,7 +127,7 @@ impl<'w, S: Surface> Tracer<'w, S> {
             return false;
         }
         path.throughput /= odds;
-        path.ray = exits.leave(sample.wi);
+        path.ray = exits.leave(wi);
         path.pdf = (!sample.flags.delta).then_some(sample.pdf);
         true
     }
@@ -153,9 +154,7 @@ impl<'w, S: Surface> Tracer<'w, S> {
     fn escaped(&self, path: &Path) -> Vec3 {
         let radiance = self.world.environment.radiance(path.ray.dir);
         match path.pdf {
-            Some(pdf) if self.sample_env => {
-                radiance * power_heuristic(pdf, self.world.environment.pdf(path.ray.dir))
-            }
+            Some(pdf) if self.sample_env => radiance * power_heuristic(pdf, self.world.environment.pdf(path.ray.dir)),
             _ => radiance,
         }
     }
@@ -220,7 +219,7 @@ impl Scatter for Matte {
         let wi = Vec3::new(local.x, local.z, local.y);
         let Eval { f_cos, pdf } = self.eval(wi);
         let weight = FLOOR_ALBEDO.to_array();
-        (pdf > 0.0).then_some(Sample { wi, f_cos, pdf, weight, flags: SampleFlags::default() })
+        (pdf > 0.0).then_some(Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default() })
     }
 
     fn emission(&self) -> Rgb32 {

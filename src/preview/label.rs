@@ -25,7 +25,8 @@ pub fn draw(image: &mut Image, text: &str, left: i64, top: i64, scale: u32, ink:
             for column in 0..CELL * scale {
                 let lit = glyph[(row / scale) as usize] >> (column / scale) & 1 == 1;
                 let (px, py) = (x + i64::from(column), top + i64::from(row));
-                let inside = (0..i64::from(image.width())).contains(&px) && (0..i64::from(image.height())).contains(&py);
+                let inside =
+                    (0..i64::from(image.width())).contains(&px) && (0..i64::from(image.height())).contains(&py);
                 if lit && inside {
                     image.set_pixel(px as u32, py as u32, ink);
                 }

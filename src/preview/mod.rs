@@ -193,8 +193,9 @@ impl Stage {
         check(settings)?;
         let environment = match (settings.scene, &settings.env) {
             (Scene::Furnace, _) => Environment::uniform(1.0),
-            (_, Some(path)) => Environment::open(path)
-                .map_err(|reason| RenderError::Environment { path: path.clone(), reason })?,
+            (_, Some(path)) => {
+                Environment::open(path).map_err(|reason| RenderError::Environment { path: path.clone(), reason })?
+            }
             (_, None) => studio::environment(),
         };
         let pool = rayon::ThreadPoolBuilder::new()
@@ -214,8 +215,7 @@ impl Stage {
     pub fn render<S: Surface>(&self, surface: &S, control: Control<'_>) -> Result<Rendered, RenderError> {
         let start = Instant::now();
         let tracer = integrator::Tracer::new(&self.world, surface, &self.settings);
-        let (image, tally) =
-            self.pool.install(|| film::expose(&self.settings, &self.camera, &tracer, control))?;
+        let (image, tally) = self.pool.install(|| film::expose(&self.settings, &self.camera, &tracer, control))?;
         let stats = Stats {
             seconds: start.elapsed().as_secs_f64(),
             samples: u64::from(self.settings.spp) * u64::from(image.width()) * u64::from(image.height()),

@@ -30,7 +30,10 @@ pub struct Point {
 pub enum Hit {
     Subject(Point),
     /// The floor: where, and how much of it is there (it fades into the backdrop far out).
-    Floor { p: Vec3, opacity: f32 },
+    Floor {
+        p: Vec3,
+        opacity: f32,
+    },
     Nothing,
 }
 

@@ -37,7 +37,7 @@ impl Surface for Material {
 
 impl Scatter for Bsdf<'_> {
     fn eval(&self, wi: Vec3) -> Eval {
-        Bsdf::eval(self, wi)
+        Bsdf::eval(self, wi.to_array())
     }
     fn sample(&self, u: [f32; 3]) -> Option<Sample> {
         Bsdf::sample(self, u)

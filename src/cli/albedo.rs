@@ -1,0 +1,157 @@
+//! `overcoat albedo`.
+
+use super::input::{Evaluate, in_tier};
+use super::{Failure, Global, Outcome, output};
+use crate::audit::{Albedo, Side, Tolerance, albedo, breakdown};
+use crate::engine::Material;
+use crate::globals::Globals;
+use crate::lobes::registry::LobeClass;
+use clap::{Args, ValueEnum};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+#[derive(Args, Debug)]
+pub struct AlbedoArgs {
+    /// The script; `-` reads stdin.
+    file: PathBuf,
+    /// Which direction is held: the viewer's, or the light's.
+    #[arg(long, value_enum, default_value = "view")]
+    side: SideArg,
+    /// Cosines of the held direction to N; negative is below the surface.
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "A,B,…")]
+    cos: Vec<f64>,
+    /// Azimuth of the held direction from dPdu, in degrees.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true, value_name = "DEGREES")]
+    phi: f64,
+    /// Also tell where the energy goes, lobe by lobe (with `--side view`).
+    #[arg(long)]
+    explain: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SideArg {
+    View,
+    Light,
+}
+
+impl SideArg {
+    fn name(self) -> &'static str {
+        match self {
+            SideArg::View => "view",
+            SideArg::Light => "light",
+        }
+    }
+}
+
+const DEFAULT_COSINES: [f64; 12] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.01];
+/// More lobes than this are not explained one by one.
+const MAX_EXPLAINED: usize = 64;
+
+/// One measured direction.
+struct Row {
+    cos: f64,
+    direction: [f64; 3],
+    albedo: Albedo,
+    explained: Option<Value>,
+}
+
+pub fn run(global: &Global, args: &AlbedoArgs) -> Outcome {
+    let cosines = if args.cos.is_empty() { DEFAULT_COSINES.to_vec() } else { args.cos.clone() };
+    if let Some(bad) = cosines.iter().find(|c| !(-1.0..=1.0).contains(*c)) {
+        return Err(Failure::usage(format!("--cos {bad}: a cosine lies between -1 and 1")));
+    }
+    if !args.phi.is_finite() {
+        return Err(Failure::usage(format!("--phi {}: expected an angle in degrees", args.phi)));
+    }
+    if args.explain && matches!(args.side, SideArg::Light) {
+        return Err(Failure::usage("--explain looks at the view side; leave --side light out"));
+    }
+    let material = global.material(&args.file, &[])?;
+    let rows = in_tier!(material, measure(&material, &cosines, args))?;
+    if global.json {
+        let rows: Vec<Value> = rows.iter().map(row_json).collect();
+        return output::json(&json!({ "side": args.side.name(), "rows": rows }));
+    }
+    let mut text = format!("albedo, {} side\n     cos        r        g        b    error\n", args.side.name());
+    for row in &rows {
+        let [r, g, b] = row.albedo.value;
+        let _ = writeln!(text, "{:8.4} {r:8.5} {g:8.5} {b:8.5}  {:.1e}", row.cos, row.albedo.error);
+        if let Some(explained) = &row.explained {
+            explain_text(explained, &mut text);
+        }
+    }
+    output::write(&text)
+}
+
+fn measure<S: Evaluate>(material: &Material, cosines: &[f64], args: &AlbedoArgs) -> Result<Vec<Row>, Failure> {
+    let globals = Globals::default();
+    // Budgets depend on the script alone or on few points; whatever fails is told once, before integrating.
+    S::shade(material, &globals, [S::zero(), S::zero(), S::one()])?;
+    let subject = |wo: [S; 3]| S::shade(material, &globals, wo).unwrap_or_else(|_| crate::closure::Bsdf::black());
+    let side = match args.side {
+        SideArg::View => Side::View,
+        SideArg::Light => Side::Light,
+    };
+    let tolerance = Tolerance { error: 2e-5, evaluations: 200_000 };
+    let rows = cosines.par_iter().map(|&cos| {
+        let (sin, phi) = ((1.0 - cos * cos).max(0.0).sqrt(), args.phi.to_radians());
+        let direction = [sin * phi.cos(), sin * phi.sin(), cos];
+        let w = direction.map(S::c);
+        let albedo = albedo(&subject, side, w, tolerance);
+        let explained = args.explain.then(|| explain(&subject(w), &breakdown(&subject, w, tolerance), &albedo));
+        Row { cos, direction, albedo, explained }
+    });
+    Ok(rows.collect())
+}
+
+/// Lobe by lobe: what it scatters, and what the layers above keep from it. What is left of 1 is absorbed.
+fn explain<S: Evaluate>(
+    bsdf: &crate::closure::Bsdf<'_, S>,
+    shares: &[crate::audit::LobeShare],
+    total: &Albedo,
+) -> Value {
+    if shares.len() > MAX_EXPLAINED {
+        return json!({ "note": format!("{} lobes are too many to tell apart", shares.len()) });
+    }
+    let minus = |a: [f64; 3], b: [f64; 3]| std::array::from_fn::<f64, 3, _>(|c| a[c] - b[c]);
+    let lobes: Vec<Value> = shares
+        .iter()
+        .filter(|s| bsdf.lobe_kind(s.lobe).0.class() != LobeClass::Emission)
+        .map(|s| {
+            json!({
+                "lobe": bsdf.lobe_kind(s.lobe).0.spec().name,
+                "scattered": s.scattered.value,
+                "kept_by_layers": minus(s.unlayered.value, s.scattered.value),
+            })
+        })
+        .collect();
+    json!({ "lobes": lobes, "absorbed": minus([1.0; 3], total.value) })
+}
+
+fn explain_text(explained: &Value, text: &mut String) {
+    let triple =
+        |v: &Value| (0..3).map(|c| format!("{:8.5}", v[c].as_f64().unwrap_or(0.0))).collect::<Vec<_>>().join(" ");
+    if let Some(note) = explained["note"].as_str() {
+        let _ = writeln!(text, "         {note}");
+    }
+    for lobe in explained["lobes"].as_array().into_iter().flatten() {
+        let name = lobe["lobe"].as_str().unwrap_or("");
+        let _ = writeln!(text, "         {} scattered by {name}", triple(&lobe["scattered"]));
+        let _ = writeln!(text, "         {} kept from it by the layers above", triple(&lobe["kept_by_layers"]));
+    }
+    if !explained["absorbed"].is_null() {
+        let _ = writeln!(text, "         {} of 1 is absorbed", triple(&explained["absorbed"]));
+    }
+}
+
+fn row_json(row: &Row) -> Value {
+    let mut value = json!({
+        "cos": row.cos, "dir": row.direction, "albedo": row.albedo.value, "error": row.albedo.error,
+    });
+    if let Some(explained) = &row.explained {
+        value["explain"] = explained.clone();
+    }
+    value
+}

@@ -1,0 +1,156 @@
+//! The command line program: one file per command. Takes arguments and scripts in, writes results to stdout, messages
+//! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
+
+mod albedo;
+mod eval;
+mod input;
+mod lobes;
+mod output;
+mod render;
+mod sample;
+mod tree;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Layered, energy-conserving BSDFs from Open Shading Language style scripts.
+#[derive(Parser, Debug)]
+#[command(name = "overcoat", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options every command takes.
+#[derive(Args, Debug, Clone)]
+struct Global {
+    /// Set a shader parameter: a number, three numbers `r,g,b`, or a string. Repeatable.
+    #[arg(long, global = true, value_name = "NAME=VALUE")]
+    set: Vec<String>,
+    /// Accuracy and speed.
+    #[arg(long, global = true, value_enum, default_value = "standard")]
+    tier: TierArg,
+    /// How a layer scales what lies below it.
+    #[arg(long, global = true, value_enum, default_value = "min")]
+    layering: LayeringArg,
+    /// Which channels of a top's albedo a layer answers to.
+    #[arg(long, global = true, value_enum, default_value = "largest")]
+    tint_rule: TintArg,
+    /// Write one JSON document to stdout.
+    #[arg(long, global = true)]
+    json: bool,
+    /// No progress, no warnings.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TierArg {
+    Fast,
+    Standard,
+    Reference,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum LayeringArg {
+    /// min(α(ωo), α(ωi)): reciprocal, never gains.
+    Min,
+    /// 1 − E(ωo): loses nothing toward the camera, not reciprocal.
+    View,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TintArg {
+    /// The largest channel dims all.
+    Largest,
+    /// Each channel dims itself.
+    Channel,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Print the closure tree a script leaves, after its parameters are set.
+    Tree {
+        /// The script; `-` reads stdin.
+        file: PathBuf,
+    },
+    /// Evaluate f·|cos θi| and the pdf for a pair of directions.
+    Eval {
+        /// The script; `-` reads stdin.
+        file: PathBuf,
+        /// Toward the viewer, world space; normalised.
+        #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+        wo: String,
+        /// Toward the light, world space; normalised. Repeatable.
+        #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, required = true)]
+        wi: Vec<String>,
+    },
+    /// Draw directions for one ωo, as CSV.
+    Sample {
+        /// The script; `-` reads stdin.
+        file: PathBuf,
+        /// Toward the viewer, world space; normalised.
+        #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+        wo: String,
+        /// How many.
+        #[arg(long, default_value_t = 16)]
+        count: u64,
+        /// Same seed, same samples.
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+    },
+    /// Measure the directional albedo by quadrature, delta lobes included.
+    Albedo(albedo::AlbedoArgs),
+    /// List the closures a script can call.
+    Lobes {
+        /// Only those of this name.
+        name: Option<String>,
+    },
+    /// Make a picture of the material.
+    Render(render::RenderArgs),
+}
+
+/// Why a command stops.
+enum Failure {
+    /// The script has errors: the rendered messages.
+    Script(String),
+    /// Wrong usage, or a file that cannot be read or written.
+    Usage(String),
+    /// Whoever reads stdout has gone.
+    Closed,
+}
+
+impl Failure {
+    fn usage(message: impl Into<String>) -> Failure {
+        Failure::Usage(message.into())
+    }
+}
+
+type Outcome = Result<(), Failure>;
+
+/// Runs the program with the arguments of the process.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let outcome = match &cli.command {
+        Command::Tree { file } => tree::run(&cli.global, file),
+        Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
+        Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
+        Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
+        Command::Render(args) => render::run(&cli.global, args),
+    };
+    match outcome {
+        Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
+        Err(Failure::Script(messages)) => {
+            eprintln!("{}", messages.trim_end());
+            ExitCode::from(1)
+        }
+        Err(Failure::Usage(message)) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}

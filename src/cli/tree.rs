@@ -1,0 +1,133 @@
+//! `overcoat tree`.
+
+use super::output::{number, numbers};
+use super::{Failure, Global, Outcome, output};
+use crate::closure::{ClosureTree, Node, NodeId};
+use crate::globals::Globals;
+use crate::lobes::LobeKind;
+use crate::lobes::registry::ParamTy;
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Deeper documents overflow the stack of those who write and read them.
+const MAX_DEPTH: u32 = 1000;
+
+pub fn run(global: &Global, file: &Path) -> Outcome {
+    let material = global.material(file, &[])?;
+    let tree = material.tree(&Globals::default())?;
+    let depth = tree.size(tree.root()).depth;
+    if depth > MAX_DEPTH {
+        return Err(Failure::Script(format!(
+            "error: the closure tree is {depth} nodes deep; up to {MAX_DEPTH} can be printed"
+        )));
+    }
+    if global.json {
+        return output::json(&json!({ "shader": material.name(), "closure": node(&tree, tree.root()) }));
+    }
+    let mut text = format!("{}\n", material.name());
+    outline(&tree, &mut text);
+    output::write(&text)
+}
+
+/// What an unfinished node waits for.
+enum Step {
+    Visit(NodeId),
+    /// Takes as many finished terms as the number says.
+    Add(usize),
+    Mul([f32; 3]),
+    Layer,
+}
+
+/// The tree as JSON; sums of sums become one sum. A loop, because sums may be very long.
+fn node(tree: &ClosureTree, root: NodeId) -> Value {
+    let mut steps = vec![Step::Visit(root)];
+    let mut done: Vec<Value> = Vec::new();
+    while let Some(step) = steps.pop() {
+        match step {
+            Step::Visit(id) => match tree.node(id) {
+                Node::Zero => done.push(json!({"kind": "zero"})),
+                Node::Lobe { kind, slots, .. } => done.push(lobe(kind, tree.values(kind, slots))),
+                Node::Mul(weight, c) => steps.extend([Step::Mul(weight), Step::Visit(c)]),
+                Node::Layer { top, base } => steps.extend([Step::Layer, Step::Visit(base), Step::Visit(top)]),
+                Node::Add(..) => {
+                    let terms = terms(tree, id);
+                    steps.push(Step::Add(terms.len()));
+                    steps.extend(terms.into_iter().rev().map(Step::Visit));
+                }
+            },
+            Step::Add(count) => {
+                let terms = done.split_off(done.len() - count);
+                done.push(json!({"kind": "add", "terms": terms}));
+            }
+            Step::Mul(weight) => {
+                let closure = done.pop();
+                done.push(json!({"kind": "mul", "weight": numbers(&weight), "closure": closure}));
+            }
+            Step::Layer => {
+                let (base, top) = (done.pop(), done.pop());
+                done.push(json!({"kind": "layer", "top": top, "base": base}));
+            }
+        }
+    }
+    done.pop().unwrap_or(Value::Null)
+}
+
+/// The terms of a sum, in order, sums within it dissolved.
+fn terms(tree: &ClosureTree, id: NodeId) -> Vec<NodeId> {
+    let (mut found, mut waiting) = (Vec::new(), vec![id]);
+    while let Some(id) = waiting.pop() {
+        match tree.node(id) {
+            Node::Add(a, b) => waiting.extend([b, a]),
+            _ => found.push(id),
+        }
+    }
+    found
+}
+
+fn lobe(kind: LobeKind, values: &[f32]) -> Value {
+    let mut params = Map::new();
+    let mut at = 0;
+    for p in kind.spec().params {
+        let slots = &values[at..at + p.ty.slots()];
+        at += p.ty.slots();
+        let value = match (p.ty, slots) {
+            (ParamTy::String, [index]) => json!(p.options.get(p.clamp(0, *index) as usize)),
+            (ParamTy::Int, [x]) => json!(*x as i64),
+            (_, [x]) => number(*x),
+            (_, xs) => numbers(xs),
+        };
+        params.insert(p.name.to_owned(), value);
+    }
+    json!({"kind": "lobe", "name": kind.spec().name, "params": params})
+}
+
+/// The tree as indented lines.
+fn outline(tree: &ClosureTree, text: &mut String) {
+    let mut waiting = vec![(tree.root(), 1, String::new())];
+    while let Some((id, depth, role)) = waiting.pop() {
+        let indent = "  ".repeat(depth);
+        let _ = write!(text, "{indent}{role}");
+        match tree.node(id) {
+            Node::Zero => text.push_str("black\n"),
+            Node::Lobe { kind, slots, .. } => {
+                let Value::Object(params) = &lobe(kind, tree.values(kind, slots))["params"] else { continue };
+                let list: Vec<String> = params.iter().map(|(name, value)| format!("{name} {value}")).collect();
+                let _ = writeln!(text, "{} ({})", kind.spec().name, list.join(", "));
+            }
+            Node::Mul([r, g, b], c) => {
+                let _ = writeln!(text, "× {r} {g} {b}");
+                waiting.push((c, depth + 1, String::new()));
+            }
+            Node::Layer { top, base } => {
+                text.push_str("layer\n");
+                waiting.push((base, depth + 1, "base: ".into()));
+                waiting.push((top, depth + 1, "top: ".into()));
+            }
+            Node::Add(..) => {
+                text.push_str("sum\n");
+                waiting.extend(terms(tree, id).into_iter().rev().map(|t| (t, depth + 1, String::new())));
+            }
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The layering rule: the only place that knows how a layer scales what lies below it.
+//!
+//! f = f_top + s(ωo, ωi)·f_base, s = min(α(ωo), α(ωi)), α(ω) = 1 − Ē_top(ω) clamped to [0, 1], where Ē_top bounds the
+//! albedo of everything in the top on ω's own side. For any base that keeps energy,
+//! ∫ f|cos| ≤ E_top(ωo) + (1 − Ē_top(ωo)) ≤ 1, from either side: the composition cannot gain. (Conty & Kulla 2017, §5,
+//! after Kelemen & Szirmay-Kalos 2001. Read literally the paper scales by the sheen's own albedo; α is what a layer
+//! passes on.)
+//!
+//! [`LayerStack`] follows a tree written out top before base, and gives for one direction at a time the bound of every
+//! top and the scale of every lobe. A layer may stand in another's top or base, at any depth.
+
+use crate::lobes::Rgb;
+use crate::optics::{Lift, Real};
+
+/// How a layer scales its base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LayeringRule {
+    /// min(α(ωo), α(ωi)): reciprocal, never gains; loses up to 15 % on a white base.
+    #[default]
+    Min,
+    /// 1 − E(ωo): loses nothing seen from the camera; not reciprocal, gains seen from the light.
+    View,
+}
+
+/// Which channels of a top's albedo a layer answers to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum TintRule {
+    /// The largest channel dims all: the base keeps its hue.
+    #[default]
+    Largest,
+    /// Each channel dims itself: lossless for coloured tops, but the base takes the complementary hue.
+    Channel,
+}
+
+/// α = 1 − Ē, what a layer passes on.
+#[inline(always)]
+pub fn alpha<L: Real>(tint: TintRule, bound: Rgb<L>) -> Rgb<L> {
+    let pass = |e: L| (L::one() - e).clamp(L::zero(), L::one());
+    match tint {
+        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); 3],
+        TintRule::Channel => bound.map(pass),
+    }
+}
+
+/// s(ωo, ωi), what a layer scales its base by.
+#[inline(always)]
+pub fn scale<L: Real>(rule: LayeringRule, alpha_o: Rgb<L>, alpha_i: Rgb<L>) -> Rgb<L> {
+    match rule {
+        LayeringRule::Min => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
+        LayeringRule::View => alpha_o,
+    }
+}
+
+/// What is set aside while a layer is open.
+#[derive(Clone, Copy, Debug)]
+struct Saved<L> {
+    bound: Rgb<L>,
+    path: Rgb<L>,
+    scale: Rgb<L>,
+}
+
+/// Walks a tree, written out as `begin top… middle base… end` per layer, for one direction.
+///
+/// `D` is how many layers may be open at once.
+pub struct LayerStack<L, const D: usize> {
+    saved: [Saved<L>; D],
+    open: usize,
+    /// Bound on the albedo of the top being walked (outside any top: of the whole tree), so far.
+    bound: Rgb<L>,
+    /// What the layers between that top's root and here pass on.
+    path: Rgb<L>,
+    /// The product of all layer scales above here.
+    scale: Rgb<L>,
+}
+
+impl<L: Real, const D: usize> Default for LayerStack<L, D> {
+    #[inline(always)]
+    fn default() -> Self {
+        let (zero, one) = ([L::zero(); 3], [L::one(); 3]);
+        LayerStack {
+            saved: [Saved { bound: zero, path: one, scale: one }; D],
+            open: 0,
+            bound: zero,
+            path: one,
+            scale: one,
+        }
+    }
+}
+
+impl<L: Real, const D: usize> LayerStack<L, D> {
+    /// What the layers above scale a lobe here by.
+    #[inline(always)]
+    pub fn scale(&self) -> Rgb<L> {
+        self.scale
+    }
+
+    /// The bound on the whole tree's albedo, after the walk.
+    #[inline(always)]
+    pub fn bound(&self) -> Rgb<L> {
+        self.bound
+    }
+
+    /// A lobe whose albedo bound, weighted relative to the top it stands in, is `weight`·`bound`.
+    #[inline(always)]
+    pub fn lobe<S: Real>(&mut self, weight: Rgb<S>, bound: Rgb<L>)
+    where
+        L: Lift<S>,
+    {
+        for c in 0..3 {
+            self.bound[c] = (L::lift(weight[c]) * self.path[c]).mul_add(bound[c], self.bound[c]);
+        }
+    }
+
+    /// A layer begins, its top first.
+    #[inline(always)]
+    pub fn begin(&mut self) {
+        self.saved[self.open] = Saved { bound: self.bound, path: self.path, scale: self.scale };
+        self.open += 1;
+        self.bound = [L::zero(); 3];
+        self.path = [L::one(); 3];
+    }
+
+    /// The top is complete, the base follows. `weight` is the layer's own weight relative to the top it stands in;
+    /// `alpha_o` is this layer's α toward ωo, or `None` if this walk is the one for ωo. Returns α for this direction.
+    #[inline(always)]
+    pub fn middle<S: Real>(
+        &mut self,
+        weight: Rgb<S>,
+        rule: LayeringRule,
+        tint: TintRule,
+        alpha_o: Option<Rgb<S>>,
+    ) -> Rgb<L>
+    where
+        L: Lift<S>,
+    {
+        let alpha = alpha(tint, self.bound);
+        // Seen from the light, `view` dims nothing: the bound there is Ē_t + Ē_b.
+        let passed = if rule == LayeringRule::View && alpha_o.is_some() { [L::one(); 3] } else { alpha };
+        let toward_viewer = alpha_o.map_or(alpha, |a| a.map(L::lift));
+        let s = scale(rule, toward_viewer, alpha);
+        let outer = &self.saved[self.open - 1];
+        for c in 0..3 {
+            // Bound of a layer as part of a top: Ē_t + α·Ē_b, per channel.
+            self.bound[c] = (L::lift(weight[c]) * outer.path[c]).mul_add(self.bound[c], outer.bound[c]);
+            self.path[c] = outer.path[c] * passed[c];
+            self.scale[c] = outer.scale[c] * s[c];
+        }
+        alpha
+    }
+
+    /// The layer is complete.
+    #[inline(always)]
+    pub fn end(&mut self) {
+        self.open -= 1;
+        self.path = self.saved[self.open].path;
+        self.scale = self.saved[self.open].scale;
+    }
+}

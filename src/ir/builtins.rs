@@ -1,0 +1,382 @@
+//! The functions and constants every script has: a table, one line per overload.
+//!
+//! A signature is a result and its arguments in letters: `f` float, `i` int, `c` color, `p` point, `v` vector, `n`
+//! normal, `s` string, `C` closure; `g` is float or any triple, the same throughout the line, and `t` any triple. Where
+//! several lines share a name the one with the fewest conversions is meant, the first among equals. The functions are
+//! total: like OSL's they return something sensible where mathematics has no answer.
+
+use super::body::{Cells, GlobalVar};
+use super::ops::divide;
+use super::types::Ty;
+use std::collections::HashMap;
+use std::sync::OnceLock;
+
+/// How an overload computes its result.
+#[derive(Clone, Copy)]
+pub enum Eval {
+    /// On each component of a float or triple.
+    F1(fn(f32) -> f32),
+    /// The same with two arguments.
+    F2(fn(f32, f32) -> f32),
+    /// The same with three.
+    F3(fn(f32, f32, f32) -> f32),
+    /// On ints.
+    I2(fn(i32, i32) -> i32),
+    /// On three ints.
+    I3(fn(i32, i32, i32) -> i32),
+    /// On whole values.
+    All(fn(&[Cells]) -> Cells),
+    /// Reads the shading point.
+    Global(GlobalVar),
+    /// a·(1−x) + b·x of closures.
+    MixClosures,
+}
+
+/// One overload.
+pub struct Builtin {
+    /// What scripts call.
+    pub name: &'static str,
+    sig: &'static str,
+    /// What it does.
+    pub eval: Eval,
+}
+
+/// The most arguments an overload takes.
+pub const MAX_ARGS: usize = 4;
+
+impl Builtin {
+    /// The result and argument types, one list for each reading of `g` or `t`.
+    pub fn instances(&self) -> impl Iterator<Item = (Ty, Vec<Ty>)> + '_ {
+        const ANY: [Ty; 5] = [Ty::Float, Ty::Color, Ty::Point, Ty::Vector, Ty::Normal];
+        let readings = if self.sig.contains('g') {
+            &ANY[..]
+        } else if self.sig.contains('t') {
+            &ANY[1..]
+        } else {
+            &ANY[..1]
+        };
+        readings.iter().map(|any| {
+            let mut types = self.sig.chars().map(|letter| match letter {
+                'f' => Ty::Float,
+                'i' => Ty::Int,
+                'c' => Ty::Color,
+                'p' => Ty::Point,
+                'v' => Ty::Vector,
+                'n' => Ty::Normal,
+                's' => Ty::String,
+                'C' => Ty::Closure,
+                _ => *any,
+            });
+            let result = types.next().unwrap_or(Ty::Poison);
+            (result, types.collect())
+        })
+    }
+
+    /// As documentation would show it; `g` reads `type`.
+    pub fn signature(&self) -> String {
+        let word = |letter| match letter {
+            'f' => "float",
+            'i' => "int",
+            'c' => "color",
+            'p' => "point",
+            'v' => "vector",
+            'n' => "normal",
+            's' => "string",
+            'C' => "closure color",
+            _ => "TYPE",
+        };
+        let mut words = self.sig.chars().map(word);
+        let result = words.next().unwrap_or("");
+        format!("{result} {}({})", self.name, words.collect::<Vec<_>>().join(", "))
+    }
+
+    /// The value for known arguments; `n` is the number of components of the result.
+    pub fn apply(&self, n: usize, args: &[Cells]) -> Cells {
+        let arg = |i: usize, k: usize| args.get(i).map_or(0.0, |cells| f32::from_bits(cells[k]));
+        let int = |i: usize| args.get(i).map_or(0, |cells| cells[0] as i32);
+        let each = |f: &dyn Fn(usize) -> f32| {
+            let mut out = [0; 3];
+            out.iter_mut().enumerate().take(n).for_each(|(k, cell)| *cell = f(k).to_bits());
+            out
+        };
+        match self.eval {
+            Eval::F1(f) => each(&|k| f(arg(0, k))),
+            Eval::F2(f) => each(&|k| f(arg(0, k), arg(1, k))),
+            Eval::F3(f) => each(&|k| f(arg(0, k), arg(1, k), arg(2, k))),
+            Eval::I2(f) => [f(int(0), int(1)) as u32, 0, 0],
+            Eval::I3(f) => [f(int(0), int(1), int(2)) as u32, 0, 0],
+            Eval::All(f) => f(args),
+            Eval::Global(_) | Eval::MixClosures => [0; 3],
+        }
+    }
+}
+
+const fn line(name: &'static str, sig: &'static str, eval: Eval) -> Builtin {
+    Builtin { name, sig, eval }
+}
+
+use Eval::{All, F1, F2, F3, I2, I3};
+
+/// Every overload. The index of a line is its number in the program.
+pub static BUILTINS: &[Builtin] = &[
+    line("abs", "ii", I2(|a, _| a.wrapping_abs())),
+    line("abs", "gg", F1(f32::abs)),
+    line("fabs", "ii", I2(|a, _| a.wrapping_abs())),
+    line("fabs", "gg", F1(f32::abs)),
+    line("min", "iii", I2(i32::min)),
+    line("min", "ggg", F2(|a, b| if b < a { b } else { a })),
+    line("max", "iii", I2(i32::max)),
+    line("max", "ggg", F2(|a, b| if b > a { b } else { a })),
+    line("clamp", "iiii", I3(|x, lo, hi| x.max(lo).min(hi))),
+    line("clamp", "gggg", F3(clamp)),
+    line("mix", "CCCc", Eval::MixClosures),
+    line("mix", "gggg", F3(|a, b, x| a * (1.0 - x) + b * x)),
+    line("select", "iiii", I3(|a, b, x| if x != 0 { b } else { a })),
+    line("select", "gggg", F3(|a, b, x| if x != 0.0 { b } else { a })),
+    line("floor", "gg", F1(f32::floor)),
+    line("ceil", "gg", F1(f32::ceil)),
+    line("round", "gg", F1(f32::round)),
+    line("trunc", "gg", F1(f32::trunc)),
+    line(
+        "sign",
+        "gg",
+        F1(|x| {
+            if x > 0.0 {
+                1.0
+            } else if x < 0.0 {
+                -1.0
+            } else {
+                0.0
+            }
+        }),
+    ),
+    line("mod", "ggg", F2(|a, b| if b == 0.0 { 0.0 } else { a - b * (a / b).floor() })),
+    line("fmod", "ggg", F2(|a, b| if b == 0.0 { 0.0 } else { a % b })),
+    line("sqrt", "gg", F1(|x| if x > 0.0 { x.sqrt() } else { 0.0 })),
+    line("inversesqrt", "gg", F1(|x| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 })),
+    line("cbrt", "gg", F1(f32::cbrt)),
+    line("pow", "ggg", F2(power)),
+    line("exp", "gg", F1(f32::exp)),
+    line("exp2", "gg", F1(f32::exp2)),
+    line("expm1", "gg", F1(f32::exp_m1)),
+    line("log", "gg", F1(|x| positive(x).ln())),
+    line("log", "ggg", F2(|x, base| divide(positive(x).ln(), positive(base).ln()))),
+    line("log2", "gg", F1(|x| positive(x).log2())),
+    line("log10", "gg", F1(|x| positive(x).log10())),
+    line("sin", "gg", F1(f32::sin)),
+    line("cos", "gg", F1(f32::cos)),
+    line("tan", "gg", F1(f32::tan)),
+    line("asin", "gg", F1(|x| clamp(x, -1.0, 1.0).asin())),
+    line("acos", "gg", F1(|x| clamp(x, -1.0, 1.0).acos())),
+    line("atan", "gg", F1(f32::atan)),
+    line("atan2", "ggg", F2(f32::atan2)),
+    line("sinh", "gg", F1(f32::sinh)),
+    line("cosh", "gg", F1(f32::cosh)),
+    line("tanh", "gg", F1(f32::tanh)),
+    line("radians", "gg", F1(f32::to_radians)),
+    line("degrees", "gg", F1(f32::to_degrees)),
+    line("hypot", "fff", F2(f32::hypot)),
+    line("hypot", "ffff", F3(|a, b, c| (a * a + b * b + c * c).sqrt())),
+    line("step", "ggg", F2(|edge, x| if x < edge { 0.0 } else { 1.0 })),
+    line("linearstep", "gggg", F3(linear_step)),
+    line("smoothstep", "gggg", F3(smooth_step)),
+    line("isnan", "if", All(|a| truth(float(a, 0).is_nan()))),
+    line("isinf", "if", All(|a| truth(float(a, 0).is_infinite()))),
+    line("isfinite", "if", All(|a| truth(float(a, 0).is_finite()))),
+    line("dot", "fvv", All(|a| scalar(dot(triple(a, 0), triple(a, 1))))),
+    line("cross", "vvv", All(|a| cells(cross(triple(a, 0), triple(a, 1))))),
+    line("length", "fv", All(|a| scalar(length(triple(a, 0))))),
+    line("distance", "fpp", All(|a| scalar(length(minus(triple(a, 0), triple(a, 1)))))),
+    line("normalize", "nn", All(|a| cells(normalize(triple(a, 0))))),
+    line("normalize", "vv", All(|a| cells(normalize(triple(a, 0))))),
+    line("reflect", "vvv", All(|a| cells(reflect(triple(a, 0), triple(a, 1))))),
+    line("faceforward", "vvvv", All(|a| cells(face_forward(triple(a, 0), triple(a, 1), triple(a, 2))))),
+    line("luminance", "fc", All(|a| scalar(dot(triple(a, 0), [0.2126, 0.7152, 0.0722])))),
+    line("backfacing", "i", Eval::Global(GlobalVar::Backfacing)),
+];
+
+/// Named numbers.
+pub const CONSTANTS: &[(&str, f32)] = &[
+    ("M_PI", std::f32::consts::PI),
+    ("M_PI_2", std::f32::consts::FRAC_PI_2),
+    ("M_PI_4", std::f32::consts::FRAC_PI_4),
+    ("M_2_PI", std::f32::consts::FRAC_2_PI),
+    ("M_2PI", std::f32::consts::TAU),
+    ("M_4PI", 4.0 * std::f32::consts::PI),
+    ("M_2_SQRTPI", std::f32::consts::FRAC_2_SQRT_PI),
+    ("M_E", std::f32::consts::E),
+    ("M_LN2", std::f32::consts::LN_2),
+    ("M_LN10", std::f32::consts::LN_10),
+    ("M_LOG2E", std::f32::consts::LOG2_E),
+    ("M_LOG10E", std::f32::consts::LOG10_E),
+    ("M_SQRT2", std::f32::consts::SQRT_2),
+    ("M_SQRT1_2", std::f32::consts::FRAC_1_SQRT_2),
+];
+
+/// Functions of OSL that are not there, so that a message can say so.
+pub const UNSUPPORTED: &[&str] = &[
+    "Dx",
+    "Dy",
+    "Dz",
+    "aastep",
+    "arraylength",
+    "area",
+    "blackbody",
+    "bump",
+    "calculatenormal",
+    "cellnoise",
+    "concat",
+    "determinant",
+    "displace",
+    "endswith",
+    "environment",
+    "erf",
+    "erfc",
+    "error",
+    "filterwidth",
+    "format",
+    "fprintf",
+    "fresnel",
+    "getattribute",
+    "getchar",
+    "getmatrix",
+    "getmessage",
+    "gettextureinfo",
+    "hash",
+    "hashnoise",
+    "isconnected",
+    "logb",
+    "noise",
+    "pnoise",
+    "pointcloud_get",
+    "pointcloud_search",
+    "printf",
+    "psnoise",
+    "random",
+    "raytype",
+    "refract",
+    "regex_match",
+    "regex_search",
+    "rotate",
+    "setmessage",
+    "snoise",
+    "spline",
+    "splineinverse",
+    "split",
+    "startswith",
+    "stof",
+    "stoi",
+    "strlen",
+    "substr",
+    "surfacearea",
+    "texture",
+    "texture3d",
+    "trace",
+    "transform",
+    "transformc",
+    "transformu",
+    "transpose",
+    "warning",
+    "wavelength_color",
+];
+
+/// The overloads of a name, as indices into [`BUILTINS`].
+pub fn overloads(name: &str) -> &'static [u16] {
+    static INDEX: OnceLock<HashMap<&'static str, Vec<u16>>> = OnceLock::new();
+    let index = INDEX.get_or_init(|| {
+        let mut index: HashMap<_, Vec<u16>> = HashMap::new();
+        for (i, builtin) in BUILTINS.iter().enumerate() {
+            index.entry(builtin.name).or_default().push(i as u16);
+        }
+        index
+    });
+    index.get(name).map_or(&[], Vec::as_slice)
+}
+
+fn clamp(x: f32, lo: f32, hi: f32) -> f32 {
+    let above = if x < lo { lo } else { x };
+    if above > hi { hi } else { above }
+}
+
+/// Keeps logarithms finite.
+fn positive(x: f32) -> f32 {
+    if x > f32::MIN_POSITIVE { x } else { f32::MIN_POSITIVE }
+}
+
+/// Powers without a real value are 0, infinite ones the largest float; 0 to anything but 0 is 0.
+fn power(x: f32, y: f32) -> f32 {
+    if y == 0.0 {
+        1.0
+    } else if x == 0.0 {
+        0.0
+    } else {
+        let p = x.powf(y);
+        if p.is_nan() && !x.is_nan() && !y.is_nan() { 0.0 } else { p.clamp(-f32::MAX, f32::MAX) }
+    }
+}
+
+fn linear_step(lo: f32, hi: f32, x: f32) -> f32 {
+    if x < lo {
+        0.0
+    } else if x >= hi {
+        1.0
+    } else {
+        (x - lo) / (hi - lo)
+    }
+}
+
+fn smooth_step(lo: f32, hi: f32, x: f32) -> f32 {
+    let t = linear_step(lo, hi, x);
+    t * t * (3.0 - 2.0 * t)
+}
+
+fn float(args: &[Cells], i: usize) -> f32 {
+    f32::from_bits(args[i][0])
+}
+
+fn triple(args: &[Cells], i: usize) -> [f32; 3] {
+    args[i].map(f32::from_bits)
+}
+
+fn cells(v: [f32; 3]) -> Cells {
+    v.map(f32::to_bits)
+}
+
+fn scalar(x: f32) -> Cells {
+    [x.to_bits(), 0, 0]
+}
+
+fn truth(t: bool) -> Cells {
+    [u32::from(t), 0, 0]
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn length(v: [f32; 3]) -> f32 {
+    dot(v, v).sqrt()
+}
+
+fn normalize(v: [f32; 3]) -> [f32; 3] {
+    let length = length(v);
+    v.map(|x| divide(x, length))
+}
+
+/// The incident direction mirrored at a plane with unit normal n.
+fn reflect(i: [f32; 3], n: [f32; 3]) -> [f32; 3] {
+    let d = 2.0 * dot(n, i);
+    minus(i, n.map(|x| d * x))
+}
+
+fn face_forward(n: [f32; 3], i: [f32; 3], reference: [f32; 3]) -> [f32; 3] {
+    if dot(i, reference) < 0.0 { n } else { n.map(|x| -x) }
+}

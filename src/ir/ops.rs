@@ -1,0 +1,84 @@
+//! What each operation computes. Folding and running both call this, so that a value known early and one known late
+//! are the same value.
+
+use super::body::{Cells, Op};
+
+/// The value of an operation that touches no closure; `n` is the number of components of its operands.
+pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
+    let float = |f: fn(f32, f32) -> f32| {
+        let mut out = [0; 3];
+        for k in 0..n {
+            out[k] = f(f32::from_bits(a[k]), f32::from_bits(b[k])).to_bits();
+        }
+        out
+    };
+    let int = |f: fn(i32, i32) -> i32| [f(a[0] as i32, b[0] as i32) as u32, 0, 0];
+    let truth = |t: bool| [u32::from(t), 0, 0];
+    let compare_f = |f: fn(&f32, &f32) -> bool| truth(f(&f32::from_bits(a[0]), &f32::from_bits(b[0])));
+    let compare_i = |f: fn(&i32, &i32) -> bool| truth(f(&(a[0] as i32), &(b[0] as i32)));
+    let equal = || (0..n).all(|k| f32::from_bits(a[k]) == f32::from_bits(b[k]));
+    match op {
+        Op::NegF => float(|a, _| -a),
+        Op::AddF => float(|a, b| a + b),
+        Op::SubF => float(|a, b| a - b),
+        Op::MulF => float(|a, b| a * b),
+        Op::DivF => float(divide),
+        Op::NegI => int(|a, _| a.wrapping_neg()),
+        Op::NotI => int(|a, _| i32::from(a == 0)),
+        Op::BitNotI => int(|a, _| !a),
+        Op::AddI => int(i32::wrapping_add),
+        Op::SubI => int(i32::wrapping_sub),
+        Op::MulI => int(i32::wrapping_mul),
+        Op::DivI => int(|a, b| if b == 0 { 0 } else { a.wrapping_div(b) }),
+        Op::RemI => int(|a, b| if b == 0 { 0 } else { a.wrapping_rem(b) }),
+        Op::BitAndI => int(|a, b| a & b),
+        Op::BitOrI => int(|a, b| a | b),
+        Op::BitXorI => int(|a, b| a ^ b),
+        Op::ShlI => int(|a, b| a.wrapping_shl(b as u32)),
+        Op::ShrI => int(|a, b| a.wrapping_shr(b as u32)),
+        Op::EqF => truth(equal()),
+        Op::NeF => truth(!equal()),
+        Op::LtF => compare_f(f32::lt),
+        Op::LeF => compare_f(f32::le),
+        Op::GtF => compare_f(f32::gt),
+        Op::GeF => compare_f(f32::ge),
+        Op::EqI => compare_i(i32::eq),
+        Op::NeI => compare_i(i32::ne),
+        Op::LtI => compare_i(i32::lt),
+        Op::LeI => compare_i(i32::le),
+        Op::GtI => compare_i(i32::gt),
+        Op::GeI => compare_i(i32::ge),
+        Op::TruthF => truth((0..n).any(|k| f32::from_bits(a[k]) != 0.0)),
+        Op::TruthI => truth(a[0] != 0),
+        Op::IntToFloat => [(a[0] as i32 as f32).to_bits(), 0, 0],
+        Op::FloatToInt => [f32::from_bits(a[0]) as i32 as u32, 0, 0],
+        Op::Splat => [a[0]; 3],
+        Op::Triple => [a[0], b[0], c[0]],
+        Op::Component => [a[component(b)], 0, 0],
+        Op::Insert => {
+            let mut out = a;
+            out[component(b)] = c[0];
+            out
+        }
+        Op::And => truth(a[0] != 0 && b[0] != 0),
+        Op::Or => truth(a[0] != 0 || b[0] != 0),
+        Op::Select => {
+            if a[0] != 0 {
+                b
+            } else {
+                c
+            }
+        }
+        Op::AddC | Op::MulC | Op::Layer => [0; 3],
+    }
+}
+
+/// Division where anything by zero is zero, as OSL has it.
+pub fn divide(a: f32, b: f32) -> f32 {
+    if b == 0.0 { 0.0 } else { a / b }
+}
+
+/// An index past the end means the last component.
+fn component(index: Cells) -> usize {
+    (index[0] as i32).clamp(0, 2) as usize
+}

@@ -1,0 +1,93 @@
+//! Shared by the tests: lobes and stacks without a script, and the reference tables.
+#![allow(dead_code)]
+
+use overcoat::Globals;
+use overcoat::albedo::Precision;
+use overcoat::closure::{Bsdf, ClosureTree, Curves, Layering, NodeId, flatten};
+use overcoat::lobes::LobeKind;
+use overcoat::lobes::registry::{ParamSpec, ParamTy};
+use overcoat::optics::{Scalar, V3};
+
+/// A tree with its tables, ready to be looked at from any direction.
+pub struct Stack<S: Scalar> {
+    pub tree: ClosureTree,
+    pub curves: Curves<S>,
+    pub layering: Layering,
+}
+
+impl<S: Scalar> Stack<S> {
+    pub fn new(tree: ClosureTree, precision: Precision) -> Self {
+        let curves = Curves::for_tree(&tree, precision);
+        Stack { tree, curves, layering: Layering::default() }
+    }
+
+    pub fn bsdf(&self, wo: [S; 3]) -> Bsdf<'_, S> {
+        let wo = V3::new(wo[0], wo[1], wo[2]);
+        flatten(&self.tree, &Globals::default(), wo, self.layering, &self.curves).expect("within budget")
+    }
+}
+
+/// A direction at this cosine in the xz plane.
+pub fn at<S: Scalar>(cos: f64) -> [S; 3] {
+    [S::c((1.0 - cos * cos).max(0.0).sqrt()), S::zero(), S::c(cos)]
+}
+
+/// One lobe on its own, with N = +z and T = +x where it takes them.
+pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> NodeId {
+    let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
+    let site = tree.len() as u32;
+    tree.lobe(kind, site, &values)
+}
+
+/// A parameter block: `pick` gives a value per parameter, else its default.
+pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) -> Vec<f32> {
+    let mut values = Vec::new();
+    for p in kind.spec().params {
+        match p.ty {
+            ParamTy::Normal => values.extend([0.0, 0.0, 1.0]),
+            ParamTy::Vector => values.extend([1.0, 0.0, 0.0]),
+            _ => match pick(p) {
+                Some(v) => values.extend(std::iter::repeat_n(v, p.ty.slots())),
+                None => values.extend(p.default),
+            },
+        }
+    }
+    values
+}
+
+/// Blocks over a lobe's whole declared range: every parameter at its lower end, default, middle and upper end in turn,
+/// and all combinations for up to three parameters.
+pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
+    let free: Vec<&ParamSpec> = kind
+        .spec()
+        .params
+        .iter()
+        .filter(|p| !matches!(p.ty, ParamTy::Normal | ParamTy::Vector | ParamTy::Color))
+        .collect();
+    let choices: Vec<Vec<f32>> = free
+        .iter()
+        .map(|p| {
+            if p.ty == ParamTy::Float {
+                let (lo, hi) = (p.min.max(0.0), p.max.min(10.0));
+                vec![lo, lo + (hi - lo) * 0.1, lo + (hi - lo) * 0.4, hi]
+            } else {
+                (p.min as i32..=p.max as i32).map(|v| v as f32).collect()
+            }
+        })
+        .collect();
+    let mut sets: Vec<Vec<f32>> = vec![vec![]];
+    for c in &choices {
+        sets = sets.iter().flat_map(|s| c.iter().map(move |v| [s.as_slice(), &[*v]].concat())).collect();
+    }
+    sets.iter().map(|set| block(kind, |p| free.iter().position(|f| f.name == p.name).map(|i| set[i]))).collect()
+}
+
+/// Rows of a table in tests/data as numbers, by column name; text becomes NaN.
+pub fn table(name: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let path = format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&path).expect(&path);
+    let mut lines = text.lines().filter(|l| !l.starts_with('#'));
+    let header = lines.next().expect("header").split(',').map(String::from).collect();
+    let rows = lines.map(|l| l.split(',').map(|x| x.parse().unwrap_or(f64::NAN)).collect()).collect();
+    (header, rows)
+}

@@ -1,0 +1,125 @@
+//! The shape of the source: who may use whom, how long a file may get, where unsafe code may stand.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// What each module may use. Everything points inward: front ends know the library, the library knows no front end.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("span", &[]),
+    ("globals", &[]),
+    ("optics", &[]),
+    ("diag", &["span"]),
+    ("syntax", &["diag", "span"]),
+    ("albedo", &["optics"]),
+    ("lobes", &["albedo", "optics"]),
+    ("closure", &["lobes", "albedo", "optics", "globals"]),
+    ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
+    ("audit", &["closure", "lobes", "albedo", "optics"]),
+    ("engine", &["ir", "closure", "albedo", "optics", "diag", "span", "globals"]),
+    ("preview", &["engine", "closure", "lobes", "globals"]),
+    (
+        "cli",
+        &[
+            "engine", "preview", "audit", "closure", "lobes", "albedo", "optics", "ir", "syntax", "diag", "span",
+            "globals",
+        ],
+    ),
+];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Path relative to src, and the text without its unit tests.
+fn library() -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    sources(&root().join("src"), &mut files);
+    files
+        .iter()
+        .map(|f| {
+            let name = f.strip_prefix(root().join("src")).expect("below src").display().to_string();
+            let text = std::fs::read_to_string(f).expect("source");
+            let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or("").to_owned();
+            (name, code)
+        })
+        .collect()
+}
+
+/// The modules a text names after `crate::`.
+fn used(code: &str) -> BTreeSet<String> {
+    let mut modules = BTreeSet::new();
+    let code: String = code.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    for piece in code.split("crate::").skip(1) {
+        let names = match piece.strip_prefix('{') {
+            Some(list) => list.split('}').next().unwrap_or(""),
+            None => piece.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or(""),
+        };
+        for name in names.split(',') {
+            let name = name.split("::").next().unwrap_or("").trim();
+            modules.insert(match name {
+                "Globals" => "globals".to_owned(),
+                "Engine" | "Material" | "Shader" => "engine".to_owned(),
+                other => other.to_owned(),
+            });
+        }
+    }
+    modules.remove("");
+    modules
+}
+
+#[test]
+fn modules_use_only_what_they_may() {
+    for (file, code) in library() {
+        let module = file.split(['/', '.']).next().unwrap_or("");
+        if ["lib", "main"].contains(&module) {
+            continue;
+        }
+        let (_, allowed) = ARROWS.iter().find(|a| a.0 == module).unwrap_or_else(|| panic!("{file}: no arrow"));
+        for name in used(&code) {
+            assert!(name == module || allowed.contains(&name.as_str()), "src/{file} uses crate::{name}");
+        }
+    }
+}
+
+#[test]
+fn only_the_parser_names_the_grammars_rules() {
+    for (file, code) in library() {
+        assert!(file == "syntax/parse.rs" || !code.contains("Rule::"), "src/{file}");
+    }
+}
+
+#[test]
+fn files_stay_readable() {
+    let mut files = Vec::new();
+    for folder in ["src", "tests", "examples"] {
+        sources(&root().join(folder), &mut files);
+    }
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("source");
+        let lines = text.lines().count();
+        assert!(lines <= 600, "{}: {lines} lines", file.display());
+        assert!(text.starts_with("//!") || file.ends_with("lib.rs"), "{}: opens without its story", file.display());
+        let banner =
+            text.lines().find(|l| l.trim_start().starts_with("//") && (l.contains("=====") || l.contains("-----")));
+        assert!(banner.is_none() || file.ends_with("tidy.rs"), "{}: {banner:?}", file.display());
+    }
+}
+
+#[test]
+fn unsafe_code_stands_nowhere() {
+    for (file, code) in library() {
+        let attribute_free = code.replace("unsafe_code", "");
+        assert!(!attribute_free.contains("unsafe"), "src/{file}");
+    }
+}
