@@ -19,10 +19,10 @@ struct Lamp {
 }
 
 const LAMPS: [Lamp; 4] = [
-    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [14.0, 32.0], radiance: vec3(8.6, 8.2, 7.6) },
-    Lamp { toward: vec3(0.90, 0.30, 0.50), edge: [10.0, 50.0], radiance: vec3(0.50, 0.55, 0.62) },
-    Lamp { toward: vec3(0.72, 0.55, -0.80), edge: [10.0, 30.0], radiance: vec3(5.2, 5.5, 6.0) },
-    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 28.0], radiance: vec3(3.4, 3.5, 3.7) },
+    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [12.0, 30.0], radiance: vec3(6.0, 5.8, 5.4) },
+    Lamp { toward: vec3(0.90, 0.30, 0.50), edge: [10.0, 50.0], radiance: vec3(0.22, 0.24, 0.28) },
+    Lamp { toward: vec3(0.72, 0.50, -0.80), edge: [10.0, 28.0], radiance: vec3(4.6, 4.9, 5.4) },
+    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 26.0], radiance: vec3(3.0, 3.1, 3.3) },
 ];
 
 pub fn environment() -> Environment {
@@ -34,9 +34,11 @@ pub fn environment() -> Environment {
 }
 
 fn radiance(dir: Vec3) -> Vec3 {
-    const BACKDROP: Vec3 = vec3(0.30, 0.30, 0.31);
-    const ZENITH: Vec3 = vec3(0.55, 0.58, 0.64);
-    let sky = BACKDROP.lerp(ZENITH, smoothstep(0.0, 0.9, dir.y));
+    const GROUND: Vec3 = vec3(0.16, 0.16, 0.165);
+    const HORIZON: Vec3 = vec3(0.055, 0.056, 0.060);
+    const ZENITH: Vec3 = vec3(0.20, 0.21, 0.235);
+    let below = GROUND.lerp(HORIZON, smoothstep(-0.30, 0.02, dir.y));
+    let sky = below.lerp(ZENITH, smoothstep(0.1, 0.9, dir.y));
     LAMPS.iter().fold(sky, |sum, lamp| {
         let [inner, outer] = lamp.edge.map(|degrees| degrees.to_radians().cos());
         sum + lamp.radiance * smoothstep(outer, inner, dir.dot(lamp.toward.normalize()))
