@@ -29,6 +29,9 @@ pub struct CurveSpec {
     pub axis: Option<Axis>,
     /// E_light equals E_view and need not be integrated.
     pub reciprocal: bool,
+    /// The lobe gains energy somewhere, and is therefore divided by max(1, Ē(ωo), Ē(ωi)); see [`AlbedoCurve::excess`].
+    /// The curve is that of the divided lobe.
+    pub bounded: bool,
 }
 
 impl PartialEq for CurveSpec {
@@ -37,6 +40,7 @@ impl PartialEq for CurveSpec {
             && self.key == o.key
             && self.axis == o.axis
             && self.reciprocal == o.reciprocal
+            && self.bounded == o.bounded
     }
 }
 
@@ -69,6 +73,8 @@ pub struct AlbedoCurve<S> {
     /// Row after row, `cos_nodes` each; a row per node of the varying parameter.
     view: Vec<S>,
     bound: Vec<S>,
+    /// Empty unless [`CurveSpec::bounded`].
+    excess: Vec<S>,
     cos_nodes: usize,
     rows: usize,
     lo: S,
@@ -82,26 +88,41 @@ where
 {
     /// For lobes that ask for no table; reads as 0.
     fn default() -> Self {
-        AlbedoCurve { view: vec![], bound: vec![], cos_nodes: 0, rows: 0, lo: S::zero(), inv_range: S::zero() }
+        AlbedoCurve {
+            view: vec![],
+            bound: vec![],
+            excess: vec![],
+            cos_nodes: 0,
+            rows: 0,
+            lo: S::zero(),
+            inv_range: S::zero(),
+        }
     }
 }
 
 impl<S: Real> AlbedoCurve<S> {
-    /// E_view at cosine `cos`; `parameter` is the varying one and is ignored if none varies. 0 for cos ≤ 0.
+    /// E_view for the direction `w`; `parameter` is the varying one and is ignored if none varies. 0 below the surface.
     #[inline(always)]
-    pub fn view<L: Real + Lift<S>>(&self, cos: L, parameter: L) -> L {
-        self.read(&self.view, cos, parameter)
+    pub fn view<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+        self.read(&self.view, w.z, parameter)
     }
 
-    /// At least max(E_view, E_light); 0 for cos ≤ 0.
+    /// At least max(E_view, E_light); 0 below the surface.
     #[inline(always)]
-    pub fn bound<L: Real + Lift<S>>(&self, cos: L, parameter: L) -> L {
-        self.read(&self.bound, cos, parameter)
+    pub fn bound<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+        self.read(&self.bound, w.z, parameter)
+    }
+
+    /// At least max(1, E_view, E_light) of the lobe before it is divided. A lobe that gains divides f by the larger of
+    /// this at ωo and at ωi: symmetric, and E ≤ 1 from both sides. 1 for lobes that never gain.
+    #[inline(always)]
+    pub fn excess<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+        self.read(&self.excess, w.z, parameter).max(L::one())
     }
 
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
-        (self.view.len() + self.bound.len()) * size_of::<S>()
+        (self.view.len() + self.bound.len() + self.excess.len()) * size_of::<S>()
     }
 
     #[inline(always)]
@@ -133,6 +154,21 @@ impl<S: Real> AlbedoCurve<S> {
 impl CurveSpec {
     /// Integrates the albedos at the nodes, then measures the interpolation between them and lifts the bound by it.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> AlbedoCurve<S> {
+        let raw = self.bake_with(precision, &AlbedoCurve::default());
+        if !self.bounded {
+            return raw;
+        }
+        // Twice: what the lobe gains by, then the lobe that is divided by it.
+        let at_least_one = |e: &S| e.max(S::one());
+        let excess = AlbedoCurve { excess: raw.bound.iter().map(at_least_one).collect(), ..raw };
+        let mut curve = self.bake_with(precision, &excess);
+        for b in &mut curve.bound {
+            *b = b.min(S::one());
+        }
+        AlbedoCurve { excess: excess.excess, ..curve }
+    }
+
+    fn bake_with<S: Scalar>(&self, precision: Precision, excess: &AlbedoCurve<S>) -> AlbedoCurve<S> {
         let quadrature = Quadrature::new(precision);
         let n = precision.cos_nodes;
         let (lo, hi) = self.axis.map_or((0.0, 0.0), |a| (a.lo.sqrt(), a.hi.sqrt()));
@@ -143,52 +179,52 @@ impl CurveSpec {
         let nodes: Vec<(f64, f64)> = (0..rows * n).map(|k| ((k / n) as f64, (k % n) as f64)).collect();
         let albedos = parallel(&nodes, |&(row, node)| {
             // Just above the horizon in place of the horizon itself, where a one-sided lobe is black.
-            quadrature.albedos(self, parameter(row), cosine(node).max(1e-12))
+            quadrature.albedos(self, excess, parameter(row), cosine(node).max(1e-12))
         });
         let mut curve = AlbedoCurve {
             view: albedos.iter().map(|a| S::c(a.view)).collect(),
             bound: albedos.iter().map(|a| S::c(a.bound())).collect(),
+            excess: vec![],
             cos_nodes: n,
             rows,
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
         };
-        let lifts = self.shortfalls(&curve, &quadrature, parameter, cosine);
+        let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos).bound();
+        let lifts = shortfalls(&curve, truth, parameter, cosine);
         for (b, lift) in curve.bound.iter_mut().zip(lifts) {
             *b += S::c(precision.margin + lift);
         }
         curve
     }
+}
 
-    /// How much every node of the bound must rise so that no probe between the nodes lies above it, with a fifth more
-    /// for what lies between the probes.
-    fn shortfalls<S: Scalar>(
-        &self,
-        curve: &AlbedoCurve<S>,
-        quadrature: &Quadrature,
-        parameter: impl Fn(f64) -> f64 + Sync,
-        cosine: impl Fn(f64) -> f64 + Sync,
-    ) -> Vec<f64> {
-        // Cell centres, and the middles of the cells' edges between rows.
-        let half_rows = 2 * curve.rows - 1;
-        let probes: Vec<(usize, usize)> =
-            (0..half_rows).flat_map(|row| (0..curve.cos_nodes - 1).map(move |node| (row, node))).collect();
-        let shortfalls = parallel(&probes, |&(half_row, node)| {
-            let (p, cos) = (parameter(half_row as f64 / 2.0), cosine(node as f64 + 0.5));
-            let truth = quadrature.albedos(self, p, cos).bound();
-            truth - curve.bound(S::c(cos), S::c(p)).to_f64()
-        });
-        let mut lifts = vec![0.0f64; curve.rows * curve.cos_nodes];
-        for (&(half_row, node), shortfall) in probes.iter().zip(shortfalls) {
-            for row in [half_row / 2, half_row.div_ceil(2)] {
-                for corner in [node, node + 1] {
-                    let lift = &mut lifts[row * curve.cos_nodes + corner];
-                    *lift = lift.max(1.2 * shortfall);
-                }
+/// How much every node of the bound must rise so that no probe between the nodes lies above it, with a fifth more
+/// for what lies between the probes.
+fn shortfalls<S: Scalar>(
+    curve: &AlbedoCurve<S>,
+    truth: impl Fn(f64, f64) -> f64 + Sync,
+    parameter: impl Fn(f64) -> f64 + Sync,
+    cosine: impl Fn(f64) -> f64 + Sync,
+) -> Vec<f64> {
+    // Cell centres, and the middles of the cells' edges between rows.
+    let half_rows = 2 * curve.rows - 1;
+    let probes: Vec<(usize, usize)> =
+        (0..half_rows).flat_map(|row| (0..curve.cos_nodes - 1).map(move |node| (row, node))).collect();
+    let shortfalls = parallel(&probes, |&(half_row, node)| {
+        let (p, cos) = (parameter(half_row as f64 / 2.0), cosine(node as f64 + 0.5));
+        truth(p, cos) - curve.bound(V3::polar(S::c(cos), S::zero()), S::c(p)).to_f64()
+    });
+    let mut lifts = vec![0.0f64; curve.rows * curve.cos_nodes];
+    for (&(half_row, node), shortfall) in probes.iter().zip(shortfalls) {
+        for row in [half_row / 2, half_row.div_ceil(2)] {
+            for corner in [node, node + 1] {
+                let lift = &mut lifts[row * curve.cos_nodes + corner];
+                *lift = lift.max(1.2 * shortfall);
             }
         }
-        lifts
     }
+    lifts
 }
 
 /// E_view and E_light at one cosine.
@@ -224,7 +260,9 @@ impl Quadrature {
     }
 
     /// Both albedos at `cos` with the varying parameter, if there is one, at `parameter`.
-    pub fn albedos(&self, spec: &CurveSpec, parameter: f64, cos: f64) -> Albedos {
+    ///
+    /// f is divided by the larger `excess` of its two directions.
+    pub fn albedos<S: Scalar>(&self, spec: &CurveSpec, excess: &AlbedoCurve<S>, parameter: f64, cos: f64) -> Albedos {
         let mut key = spec.key;
         if let Some(axis) = spec.axis {
             key[axis.index] = parameter;
@@ -232,7 +270,10 @@ impl Quadrature {
         let here = V3::polar(cos, 0.0);
         let mut values = vec![0.0; self.azimuths.len()];
         let mut albedos = Albedos { view: 0.0, light: 0.0 };
+        let excess_at = |cos: f64| excess.excess(V3::polar(S::c(cos), S::zero()), S::c(parameter)).to_f64();
+        let excess_here = excess_at(cos);
         for &(mu, weight) in &self.cosines {
+            let weight = weight / excess_at(mu).max(excess_here);
             let ring: Vec<V3<f64>> = self.azimuths.iter().map(|a| V3::polar(mu, a.0)).collect();
             (spec.kernel)(&key, here, &ring, &mut values);
             albedos.view += weight * mu * self.over_azimuth(&values);
@@ -285,8 +326,9 @@ mod tests {
             for k in 1..200 {
                 let cos = (k as f64 / 200.0 + 0.001).powi(3);
                 let r = roughness.unwrap_or(0.07 + 0.93 * (k * 37 % 100) as f32 / 99.0);
-                let truth = quadrature.albedos(&spec, r as f64, cos);
-                let (view, bound) = (curve.view(cos as f32, r) as f64, curve.bound(cos as f32, r) as f64);
+                let truth = quadrature.albedos(&spec, &AlbedoCurve::<f64>::default(), r as f64, cos);
+                let w = V3::polar(cos as f32, 0.3);
+                let (view, bound) = (curve.view(w, r) as f64, curve.bound(w, r) as f64);
                 assert!(bound >= truth.bound(), "r {r} cos {cos}: {bound} below {truth:?}");
                 assert!(bound <= truth.bound() + slack, "r {r} cos {cos}: {bound} far above {truth:?}");
                 assert!((view - truth.view).abs() < slack, "r {r} cos {cos}: {view} off {truth:?}");
@@ -298,8 +340,8 @@ mod tests {
     fn curves_are_black_at_and_below_the_horizon() {
         let curve = sheen(Some(0.3)).bake::<f32>(Precision { cos_nodes: 8, ..Precision::STANDARD });
         for cos in [0.0, -0.0, -1e-20, -1.0, f32::NAN] {
-            assert_eq!(curve.bound(cos, 0.3), 0.0);
+            assert_eq!(curve.bound(V3::new(0.6, 0.8, cos), 0.3), 0.0);
         }
-        assert!(curve.bound(1e-20f32, 0.3) > 0.5);
+        assert!(curve.bound(V3::new(1.0, 0.0, 1e-20), 0.3f32) > 0.5);
     }
 }

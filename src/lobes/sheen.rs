@@ -207,6 +207,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
             key: [value(rough).unwrap_or(0.0), softening.unwrap_or(1.0), 0.0, 0.0],
             axis: value(rough).is_none().then_some(Axis { index: 0, lo: rough.min as f64, hi: rough.max as f64 }),
             reciprocal: softening == Some(0.0),
+            bounded: false,
         })
     }
 
@@ -237,11 +238,11 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-        [curve.view(w.z, self.roughness); 3]
+        [curve.view(w, self.roughness); 3]
     }
 
     #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        [curve.bound(w.z, L::lift(self.roughness)); 3]
+        [curve.bound(w, L::lift(self.roughness)); 3]
     }
 }
