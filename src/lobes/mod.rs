@@ -8,12 +8,13 @@ pub mod registry;
 
 mod diffuse;
 mod emission;
+pub mod fabric;
 mod oren_nayar;
 mod sheen;
 mod translucent;
 mod transparent;
 
-use crate::albedo::{AlbedoCurve, CurveSpec};
+use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
 
@@ -33,6 +34,11 @@ pub trait Lobe<S: Real>: Sized + Copy {
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let _ = values;
         None
+    }
+
+    /// The table of whatever shape a parameter block needs: the [`curve`](Lobe::curve), unless a lobe says otherwise.
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        Self::curve(values).map(TableSpec::Cosine)
     }
 
     /// A color that multiplies the lobe and stays out of its albedo curve.
@@ -88,6 +94,11 @@ macro_rules! lobes {
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
+            pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values) ),* }
+            }
+
+            /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
                 match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
             }
@@ -158,6 +169,7 @@ lobes! {
     translucent::Translucent,
     transparent::Transparent,
     emission::Emission,
+    fabric::Fabric,
     oren_nayar::OrenNayar,
     sheen::Sheen,
 }
