@@ -79,13 +79,13 @@ pub struct FibreTables<S> {
     sheets: usize,
     rows: usize,
     nodes: usize,
-    /// Rows go over the varying parameter in place of φ.
-    axis: bool,
+    /// Rows go over this entry of the key in place of φ.
+    axis: Option<usize>,
 }
 
 impl<S> Default for FibreTables<S> {
     fn default() -> Self {
-        FibreTables { view: vec![], bound: vec![], components: 0, sheets: 1, rows: 1, nodes: 0, axis: false }
+        FibreTables { view: vec![], bound: vec![], components: 0, sheets: 1, rows: 1, nodes: 0, axis: None }
     }
 }
 
@@ -93,6 +93,11 @@ impl<S: Real> FibreTables<S> {
     /// Whether nothing was baked, because too many parameters vary.
     pub fn is_empty(&self) -> bool {
         self.view.is_empty()
+    }
+
+    /// Which entry of the key varies.
+    pub fn axis_index(&self) -> Option<usize> {
+        self.axis
     }
 
     /// Albedo per component; `t` is the varying parameter in [0, 1], ignored if none varies. 0 below the surface.
@@ -128,7 +133,7 @@ impl<S: Real> FibreTables<S> {
             (i, x - i)
         };
         let (i, s) = cell((across / (across + w.x.abs()).max(tiny)).sqrt(), self.nodes);
-        let row = if self.axis { t } else { (z / (z + w.y.abs()).max(tiny)).sqrt() };
+        let row = if self.axis.is_some() { t } else { (z / (z + w.y.abs()).max(tiny)).sqrt() };
         let (j, r) = cell(row, self.rows);
         let sheet = if self.sheets == 2 {
             L::select(w.x.lt(L::zero()), L::c((self.rows * self.nodes) as f64), L::zero())
@@ -162,6 +167,7 @@ impl FibreSpec {
         let flat = !self.around && self.axis.is_none();
         let nodes = if flat { size } else { (size / 4).clamp(14, 64) };
         let rows = match self.axis {
+            Some(_) if self.around => (precision.axis_nodes / 2).max(8),
             Some(_) => precision.axis_nodes,
             None if self.around => (size / 10).clamp(8, 28),
             None => 1,
@@ -177,9 +183,15 @@ impl FibreSpec {
         });
         let component = |c: usize| albedos.iter().map(move |a| a[c]);
         let table: Vec<S> = (0..self.components).flat_map(component).map(S::c).collect();
-        let axis = self.axis.is_some();
-        let mut tables =
-            FibreTables { bound: table.clone(), view: table, components: self.components, sheets, rows, nodes, axis };
+        let mut tables = FibreTables {
+            bound: table.clone(),
+            view: table,
+            components: self.components,
+            sheets,
+            rows,
+            nodes,
+            axis: self.axis,
+        };
         let lifts = grid.shortfalls(&tables);
         for (c, chunk) in tables.bound.chunks_mut(sheets * plane).enumerate() {
             for (bound, lift) in chunk.iter_mut().zip(&lifts) {
@@ -225,7 +237,7 @@ impl Grid<'_> {
         let mut key = self.spec.key;
         key[axis] = self.parameter(row);
         let mut largest = [0.0f64; COMPONENTS];
-        let turns = if self.spec.around { 6 } else { 1 };
+        let turns = if self.spec.around { 4 } else { 1 };
         let across = w.y.hypot(w.z);
         for k in 0..turns {
             let (y, z) = (FRAC_PI_2 * k as f64 / turns as f64).sin_cos();

@@ -6,11 +6,13 @@
 
 pub mod registry;
 
+pub mod cylinder;
 mod diffuse;
 mod emission;
 pub mod fabric;
 mod oren_nayar;
 mod sheen;
+mod thread;
 mod translucent;
 mod transparent;
 
@@ -172,6 +174,7 @@ lobes! {
     fabric::Fabric,
     oren_nayar::OrenNayar,
     sheen::Sheen,
+    thread::Thread,
 }
 
 impl LobeKind {
