@@ -179,9 +179,19 @@ impl<S: Real> Ridge<S> {
     /// Density over θi.
     #[inline(always)]
     pub fn pdf<L: Real + Lift<S>>(&self, theta: L) -> L {
-        let z = (theta - L::lift(self.center)).abs() / L::lift(self.scale);
-        let e = (-z.min(L::c(80.0))).exp();
-        e / ((L::one() + e).sq() * L::lift(self.scale) * L::lift(self.span))
+        logistic(theta - L::lift(self.center), L::lift(self.scale)) / L::lift(self.span)
+    }
+
+    /// Density over θi of the distribution about `center` before it is cut off.
+    #[inline(always)]
+    pub fn density<L: Real>(theta: L, center: L, sigma: L) -> L {
+        let end = L::c(FRAC_PI_2);
+        logistic(theta - center.clamp(-end, end), sigma * L::c(3f64.sqrt() / PI))
+    }
+
+    /// How much of the whole distribution lies within ±π/2.
+    pub fn span(&self) -> S {
+        self.span
     }
 
     /// θi for a uniform number.
@@ -190,6 +200,12 @@ impl<S: Real> Ridge<S> {
         let end = S::c(FRAC_PI_2);
         self.scale.mul_add((v / (S::one() - v)).ln(), self.center).clamp(-end, end)
     }
+}
+
+#[inline(always)]
+fn logistic<L: Real>(x: L, scale: L) -> L {
+    let e = (-(x.abs() / scale).min(L::c(80.0))).exp();
+    e / ((L::one() + e).sq() * scale)
 }
 
 /// A direction from θi and a uniform number for φi, with density ½ cos φi.

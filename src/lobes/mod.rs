@@ -6,10 +6,12 @@
 
 pub mod registry;
 
+mod cloth;
 pub mod cylinder;
 mod diffuse;
 mod emission;
 pub mod fabric;
+mod microcylinder;
 mod oren_nayar;
 mod sheen;
 mod thread;
@@ -175,6 +177,7 @@ lobes! {
     oren_nayar::OrenNayar,
     sheen::Sheen,
     thread::Thread,
+    microcylinder::Microcylinder,
 }
 
 impl LobeKind {
