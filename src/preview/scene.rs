@@ -115,7 +115,7 @@ pub fn camera(scene: Scene, aspect: f32) -> Camera {
     let (eye, target, degrees) = match scene {
         Scene::Sphere => (vec3(0.0, 2.5, 7.2), vec3(0.0, 0.93, 0.0), 21.5),
         Scene::Furnace => (vec3(0.0, 1.0, 7.2), vec3(0.0, 1.0, 0.0), 21.5),
-        Scene::Drape => (vec3(1.2, 2.9, 7.2), vec3(0.0, 0.72, 0.0), 19.0),
+        Scene::Drape => (vec3(1.2, 2.9, 7.2), vec3(0.03, 0.76, 0.0), 18.5),
     };
     Camera::look_at(eye, target, f32::to_radians(degrees), aspect)
 }

@@ -19,10 +19,10 @@ struct Lamp {
 }
 
 const LAMPS: [Lamp; 4] = [
-    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [12.0, 30.0], radiance: vec3(6.0, 5.8, 5.4) },
+    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [12.0, 30.0], radiance: vec3(7.2, 6.9, 6.4) },
     Lamp { toward: vec3(0.90, 0.30, 0.50), edge: [10.0, 50.0], radiance: vec3(0.22, 0.24, 0.28) },
-    Lamp { toward: vec3(0.72, 0.50, -0.80), edge: [10.0, 28.0], radiance: vec3(4.6, 4.9, 5.4) },
-    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 26.0], radiance: vec3(3.0, 3.1, 3.3) },
+    Lamp { toward: vec3(0.72, 0.50, -0.80), edge: [10.0, 28.0], radiance: vec3(5.2, 5.5, 6.0) },
+    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 26.0], radiance: vec3(3.5, 3.6, 3.8) },
 ];
 
 pub fn environment() -> Environment {
