@@ -96,6 +96,7 @@ pub struct Shader {
 }
 
 impl Shader {
+    /// Its name; the script’s file name if the script does not name it.
     pub fn name(&self) -> &str {
         self.checked.name()
     }
@@ -105,6 +106,7 @@ impl Shader {
         self.checked.params()
     }
 
+    /// The script, for showing messages.
     pub fn source(&self) -> &Source {
         &self.source
     }
@@ -150,10 +152,12 @@ struct Inner {
 }
 
 impl Material {
+    /// The name of the shader it came from.
     pub fn name(&self) -> &str {
         &self.inner.name
     }
 
+    /// The tier of the engine that made it.
     pub fn tier(&self) -> Tier {
         self.inner.engine.tier
     }
@@ -204,7 +208,7 @@ impl Material {
         let i = wo.map(|x| -x.to_f32());
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
         let tree = self.tree(&globals)?;
-        Ok(flatten(&tree, &globals, wo, self.inner.engine.layering, curves)?)
+        flatten(&tree, &globals, wo, self.inner.engine.layering, curves)
     }
 
     fn reference_curves(&self) -> &Curves<f64> {
@@ -228,7 +232,9 @@ fn bake<S: Scalar>(sites: &[Site], precision: Precision) -> Curves<S> {
 /// What is wrong with a script.
 #[derive(Clone, Debug)]
 pub struct ScriptError {
+    /// The script.
     pub source: Arc<Source>,
+    /// All that is wrong, with places.
     pub diagnostics: Vec<Diagnostic>,
 }
 

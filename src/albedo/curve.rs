@@ -16,16 +16,20 @@ pub type Kernel = fn(&[f64; 4], V3<f64>, &[V3<f64>], &mut [f64]);
 pub struct Axis {
     /// Its place in [`CurveSpec::key`].
     pub index: usize,
-    /// Its range.
+    /// The lower end of its range, not negative.
     pub lo: f64,
+    /// The upper end.
     pub hi: f64,
 }
 
 /// What to bake: a lobe's f, the parameters it depends on, and which of them varies.
 #[derive(Clone, Copy, Debug)]
 pub struct CurveSpec {
+    /// The function to integrate.
     pub kernel: Kernel,
+    /// Its parameters.
     pub key: [f64; 4],
+    /// Which of them varies, if one does.
     pub axis: Option<Axis>,
     /// E_light equals E_view and need not be integrated.
     pub reciprocal: bool,
@@ -53,6 +57,7 @@ pub struct Precision {
     pub axis_nodes: usize,
     /// Quadrature points over the polar angle and over half the azimuth.
     pub polar: usize,
+    /// Quadrature points over half the azimuth.
     pub azimuth: usize,
     /// What the bound is lifted by in any case: the quadrature's error and the rounding of the evaluating type.
     pub margin: f64,
@@ -230,7 +235,9 @@ fn shortfalls<S: Scalar>(
 /// E_view and E_light at one cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedos {
+    /// ∫ f(ω, ωi)·|cos θi| dωi.
     pub view: f64,
+    /// ∫ f(ωo, ω)·|cos θo| dωo.
     pub light: f64,
 }
 
@@ -247,6 +254,7 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
+    /// The rule for a precision; its table sizes do not matter here.
     pub fn new(precision: Precision) -> Self {
         let polar = Rule::gauss_legendre(precision.polar);
         let azimuth = Rule::gauss_legendre(precision.azimuth);

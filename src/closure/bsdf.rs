@@ -31,6 +31,7 @@ pub struct Sample<S = f32> {
     pub pdf: S,
     /// `f_cos / pdf`.
     pub weight: Rgb<S>,
+    /// What kind of scattering it is.
     pub flags: SampleFlags,
 }
 
@@ -205,7 +206,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                 if rest < l.probability {
                     return last;
                 }
-                rest = rest - l.probability;
+                rest -= l.probability;
             }
         }
         // Rounding may leave a little over.

@@ -66,7 +66,9 @@ impl<S: Scalar> Curves<S> {
 /// How layers scale: chosen per material, not per shading point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Layering {
+    /// How a layer scales its base.
     pub rule: LayeringRule,
+    /// Which channels of a top's albedo it answers to.
     pub tint: TintRule,
 }
 

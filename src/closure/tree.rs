@@ -27,10 +27,22 @@ pub enum Node {
     /// A closure scaled per channel; the weight lies in [0, 1e30].
     Mul(Rgb32, NodeId),
     /// `top` over `base`.
-    Layer { top: NodeId, base: NodeId },
+    Layer {
+        /// What light meets first.
+        top: NodeId,
+        /// What it scales.
+        base: NodeId,
+    },
     /// A lobe. `site` tells which place in the program made it (its albedo curve is kept per site); the parameter
-    /// values start at `slots` in [`ClosureTree::slots`].
-    Lobe { kind: LobeKind, site: u32, slots: u32 },
+    /// values are [`ClosureTree::values`] from `slots` on.
+    Lobe {
+        /// Which lobe.
+        kind: LobeKind,
+        /// The place that made it.
+        site: u32,
+        /// Where its values start.
+        slots: u32,
+    },
 }
 
 /// The largest weight a node may carry; anything above is clamped to it.
@@ -174,14 +186,17 @@ impl ClosureTree {
         self.push(Node::Lobe { kind, site, slots })
     }
 
+    /// Makes `root` the closure the tree stands for.
     pub fn set_root(&mut self, root: NodeId) {
         self.root = root;
     }
 
+    /// The closure the tree stands for.
     pub fn root(&self) -> NodeId {
         self.root
     }
 
+    /// What a node is.
     pub fn node(&self, id: NodeId) -> Node {
         self.nodes[id.index()]
     }

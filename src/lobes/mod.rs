@@ -6,12 +6,12 @@
 
 pub mod registry;
 
-mod diffuse;
-mod emission;
-mod oren_nayar;
-mod sheen;
-mod translucent;
-mod transparent;
+pub mod diffuse;
+pub mod emission;
+pub mod oren_nayar;
+pub mod sheen;
+pub mod translucent;
+pub mod transparent;
 
 use crate::albedo::{AlbedoCurve, CurveSpec};
 use crate::optics::{Lift, Real, V3};
@@ -27,6 +27,7 @@ pub type Rgb32 = [f32; 3];
 /// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
 /// type parameter is what the lobe was prepared in; `f`, `pdf` and `albedo_bound` may be evaluated over lanes.
 pub trait Lobe<S: Real>: Sized + Copy {
+    /// The declared parameters.
     type Params: ClosureParams;
 
     /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
@@ -76,7 +77,7 @@ macro_rules! lobes {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u16)]
-        pub enum LobeKind { $( $Lobe ),* }
+        pub enum LobeKind { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe ),* }
 
         impl LobeKind {
             /// Every lobe there is.
@@ -111,7 +112,7 @@ macro_rules! lobes {
 
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
-        pub enum AnyLobe<S: Real> { $( $Lobe($module::$Lobe<S>) ),* }
+        pub enum AnyLobe<S: Real> { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>) ),* }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
@@ -163,6 +164,7 @@ lobes! {
 }
 
 impl LobeKind {
+    /// Whether the lobe scatters, transmits in one direction, or emits.
     pub fn class(self) -> LobeClass {
         self.spec().class
     }

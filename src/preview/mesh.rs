@@ -16,13 +16,17 @@ use std::time::Duration;
 /// A corner shared by triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
+    /// Position.
     pub p: Vec3,
     /// Unit; its side is the front.
     pub n: Vec3,
     /// Surface coordinates, 0 to 1.
     pub u: f32,
+    /// The other one.
     pub v: f32,
+    /// ∂P/∂u.
     pub dpdu: Vec3,
+    /// ∂P/∂v.
     pub dpdv: Vec3,
 }
 
@@ -59,6 +63,7 @@ impl Mesh {
         Mesh { vertices, triangles, corners, tree }
     }
 
+    /// All corners, in the order triangles refer to them.
     pub fn vertices(&self) -> &[Vertex] {
         &self.vertices
     }

@@ -52,6 +52,7 @@ pub enum Scene {
 /// Everything but the material that decides a picture.
 #[derive(Clone, Debug)]
 pub struct RenderSettings {
+    /// What the material is shown on.
     pub scene: Scene,
     /// A lat-long HDR or EXR picture to light the scene; the built-in studio if none. [`Scene::Furnace`] ignores it.
     pub env: Option<PathBuf>,
@@ -61,6 +62,7 @@ pub struct RenderSettings {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// Same seed, same picture.
     pub seed: u64,
     /// Worker threads; 0 means one per core. Never changes the picture.
     pub threads: usize,
@@ -110,7 +112,9 @@ impl Control<'static> {
 /// A finished picture and what it took.
 #[derive(Clone, Debug)]
 pub struct Rendered {
+    /// The picture.
     pub image: Image,
+    /// What it took.
     pub stats: Stats,
 }
 
@@ -145,7 +149,12 @@ pub enum RenderError {
     /// A setting is out of range; the text says which.
     Settings(String),
     /// The environment picture cannot be used.
-    Environment { path: PathBuf, reason: String },
+    Environment {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The material failed to shade somewhere.
     Shade(ShadeError),
     /// The worker threads could not be started.

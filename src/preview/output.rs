@@ -16,7 +16,9 @@ use tempfile::NamedTempFile;
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
+    /// 8 bits a channel, as a screen shows it.
     Png,
+    /// Linear radiance.
     Exr,
 }
 
@@ -35,7 +37,9 @@ impl Format {
 /// Why a picture was not written.
 #[derive(Debug)]
 pub struct OutputError {
+    /// The file.
     pub path: PathBuf,
+    /// What went wrong.
     pub reason: String,
 }
 
