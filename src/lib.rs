@@ -49,7 +49,7 @@
 //! assert!(error.to_string().contains("did you mean `diffuse`?"));
 //! ```
 //!
-//! Without scripts, [`closure::ClosureTree`] is built in code and flattened with [`closure::flatten`].
+//! Without scripts, [`closure::ClosureTree`] is built in code and flattened with [`closure::flatten()`].
 
 pub mod albedo;
 pub mod audit;

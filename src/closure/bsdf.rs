@@ -74,12 +74,12 @@ pub(crate) struct LayerAlpha<S> {
     pub weight: Rgb<S>,
 }
 
-/// The tree written out, top before base.
+/// The tree written out, top before base. Lobes and layers are stored in the order they are met.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Op {
-    Lobe(u32),
+    Lobe,
     Begin,
-    Middle(u32),
+    Middle,
     End,
 }
 
@@ -93,10 +93,10 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) layering: Layering,
     /// The most layers open at once.
     depth: u16,
-    pub(crate) ops: SmallVec<[Op; 12]>,
+    pub(crate) ops: SmallVec<[Op; 32]>,
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
-    pub(crate) layers: SmallVec<[LayerAlpha<S>; 4]>,
-    pub(crate) frames: SmallVec<[Frame<S>; 2]>,
+    pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
+    pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
 }
 
@@ -389,24 +389,27 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     ) {
         let wi = unit_or_zero(wi);
         let mut stack = LayerStack::<L, D>::default();
+        let (mut lobe, mut layer) = (0, 0);
         let mut frame = u32::MAX;
         let mut local = wi;
         for op in &self.ops {
             match *op {
-                Op::Lobe(index) => {
-                    let l = &self.lobes[index as usize];
+                Op::Lobe => {
+                    let l = &self.lobes[lobe];
                     if l.frame != frame {
                         frame = l.frame;
                         local = self.frames[frame as usize].to_local(wi);
                     }
-                    visit(index as usize, l, stack.scale(), local);
+                    visit(lobe, l, stack.scale(), local);
+                    lobe += 1;
                     if l.in_top || bound {
                         stack.lobe(l.weight_in_top, l.lobe.albedo_bound(local, l.curve));
                     }
                 }
                 Op::Begin => stack.begin(),
-                Op::Middle(layer) => {
-                    let LayerAlpha { alpha_o, weight } = self.layers[layer as usize];
+                Op::Middle => {
+                    let LayerAlpha { alpha_o, weight } = self.layers[layer];
+                    layer += 1;
                     stack.middle(weight, self.layering.rule, self.layering.tint, Some(alpha_o));
                 }
                 Op::End => stack.end(),

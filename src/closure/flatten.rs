@@ -1,4 +1,4 @@
-//! From a tree and one ωo to the list a [`Bsdf`](super::Bsdf) walks.
+//! From a tree and one ωo to the list a `Bsdf` walks.
 //!
 //! One pass, top before base, over an explicit stack. Every lobe is prepared once; lobes that share a normal and a
 //! tangent share a frame.
@@ -116,7 +116,7 @@ struct Flattener<'t, 'm, S: Scalar, const D: usize> {
     /// The walk for ωo, made while flattening.
     stack: LayerStack<S, D>,
     /// Normal and tangent as the tree gave them, per frame.
-    frame_keys: SmallVec<[(Vec3, Vec3); 2]>,
+    frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
 }
 
 impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
@@ -140,7 +140,7 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
 
     fn walk(&mut self) {
         let one = [S::one(); 3];
-        let mut steps: SmallVec<[Step<S>; 16]> = SmallVec::new();
+        let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
         steps.push(Step::Visit(self.tree.root(), Weights { total: one, in_top: one, inside: false }));
         while let Some(step) = steps.pop() {
             match step {
@@ -164,9 +164,8 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
                 Step::Middle(w) => {
                     let Layering { rule, tint } = self.bsdf.layering;
                     let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
-                    let layer = self.bsdf.layers.len() as u32;
                     self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
-                    self.bsdf.ops.push(Op::Middle(layer));
+                    self.bsdf.ops.push(Op::Middle);
                 }
                 Step::End => {
                     self.stack.end();
@@ -200,7 +199,6 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
             LayeringRule::View => self.stack.lobe(w.in_top, albedo),
             LayeringRule::Min => self.stack.lobe(w.in_top, lobe.albedo_bound(wo, curve)),
         }
-        let index = self.bsdf.lobes.len() as u32;
         self.bsdf.lobes.push(FlatLobe {
             lobe,
             curve,
@@ -215,7 +213,7 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
             albedo: share,
             probability: S::zero(),
         });
-        self.bsdf.ops.push(Op::Lobe(index));
+        self.bsdf.ops.push(Op::Lobe);
     }
 
     /// The frame of a lobe: its own normal and tangent, or the shading point's.

@@ -51,8 +51,8 @@ pub const MAX_WEIGHT: f32 = 1e30;
 /// Closures as a shader composes them. Build with the methods below; the last call is to [`set_root`](Self::set_root).
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
-    nodes: SmallVec<[Node; 20]>,
-    sizes: SmallVec<[Size; 20]>,
+    nodes: SmallVec<[Node; 40]>,
+    sizes: SmallVec<[Size; 40]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
 }

@@ -1,7 +1,7 @@
 //! Pictures to files.
 //!
 //! An [`Image`] and a path come in; the file's extension says what becomes of them: `.png` is what a screen shows (see
-//! [`display`](super::display)), `.exr` the linear radiance. A file is written beside its destination and then renamed, so that
+//! [`display`]), `.exr` the linear radiance. A file is written beside its destination and then renamed, so that
 //! a reader never sees half a picture and a failure leaves the old one.
 
 use super::{Image, display};
