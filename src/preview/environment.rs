@@ -150,11 +150,12 @@ impl Picture {
 
     /// Bilinear between pixel centres; around in longitude, held at the poles.
     fn lookup(&self, at: Vec2) -> Vec3 {
-        let x = at.x * self.width as f32 - 0.5;
+        // A whole turn is added to keep the column positive, so that a cast rounds down.
+        let x = at.x.clamp(0.0, 1.0) * self.width as f32 + (self.width as f32 - 0.5);
         let y = (at.y * self.height as f32 - 0.5).clamp(0.0, (self.height - 1) as f32);
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let x0 = (x.floor() as i64).rem_euclid(self.width as i64) as usize;
-        let x1 = (x0 + 1) % self.width;
+        let (fx, fy) = (x - (x as usize) as f32, y - (y as usize) as f32);
+        let x0 = x as usize % self.width;
+        let x1 = if x0 + 1 == self.width { 0 } else { x0 + 1 };
         let y0 = y as usize;
         let y1 = (y0 + 1).min(self.height - 1);
         let row = |y: usize| {

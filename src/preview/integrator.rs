@@ -15,9 +15,8 @@ use crate::Globals;
 use crate::closure::{Eval, Sample, SampleFlags};
 use crate::engine::ShadeError;
 use crate::lobes::Rgb32;
-use crate::optics::sampling::cosine_hemisphere;
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// How many times a path scatters before Russian roulette may end it.
 const CERTAIN: u32 = 3;
@@ -262,8 +261,8 @@ impl Scatter for Matte {
     }
 
     fn sample(&self, u: [f32; 3]) -> Option<Sample> {
-        let local = cosine_hemisphere::<f32>([u[0], u[1]]);
-        let wi = Vec3::new(local.x, local.z, local.y);
+        let (r, (sin, cos)) = (u[0].sqrt(), (u[1] * TAU).sin_cos());
+        let wi = Vec3::new(r * cos, (1.0 - u[0]).sqrt(), r * sin);
         let Eval { f_cos, pdf } = self.eval(wi);
         let weight = FLOOR_ALBEDO.to_array();
         (pdf > 0.0).then_some(Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default() })

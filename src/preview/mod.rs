@@ -170,7 +170,7 @@ impl fmt::Display for RenderError {
             RenderError::Environment { path, reason } => {
                 write!(f, "cannot use `{}` as environment: {reason}", path.display())
             }
-            RenderError::Shade(e) => write!(f, "shading failed: {e:?}"),
+            RenderError::Shade(e) => write!(f, "shading failed: {e}"),
             RenderError::Threads(reason) => write!(f, "cannot start the render threads: {reason}"),
             RenderError::Cancelled => f.write_str("the render was stopped"),
         }

@@ -104,7 +104,7 @@ impl Floor {
         }
         let t = -ray.origin.y / ray.dir.y;
         let p = ray.origin + ray.dir * t;
-        let x = ((p.x.hypot(p.z) - self.fade[0]) / (self.fade[1] - self.fade[0])).clamp(0.0, 1.0);
+        let x = (((p.x * p.x + p.z * p.z).sqrt() - self.fade[0]) / (self.fade[1] - self.fade[0])).clamp(0.0, 1.0);
         let opacity = 1.0 - x * x * (3.0 - 2.0 * x);
         (opacity > 0.0).then_some((t, opacity))
     }

@@ -7,8 +7,9 @@
 use super::environment::{Environment, from_square};
 use glam::{Vec3, vec2, vec3};
 
-const WIDTH: usize = 512;
-const HEIGHT: usize = 256;
+/// Enough for lights this soft, and small enough to stay in the cache.
+const WIDTH: usize = 256;
+const HEIGHT: usize = 128;
 
 /// A round light with a soft edge.
 struct Lamp {
