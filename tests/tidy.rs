@@ -95,7 +95,8 @@ fn modules_use_only_what_they_may() {
 #[test]
 fn only_the_parser_names_the_grammars_rules() {
     for (file, code) in library() {
-        assert!(file == "syntax/parse.rs" || !code.contains("Rule::"), "src/{file}");
+        let named = code.match_indices("Rule::").any(|(at, _)| !code[..at].ends_with(char::is_alphanumeric));
+        assert!(file == "syntax/parse.rs" || !named, "src/{file}");
     }
 }
 
