@@ -14,6 +14,7 @@ use crate::span::Source;
 use glam::Vec3;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 /// What speed is traded for. The model is the same in every tier, and every tier conserves energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -125,14 +126,30 @@ impl Shader {
             .checked
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
+        Ok(self.finished(program))
+    }
+
+    /// The material with every parameter left open, read at every point: what specialising is measured against.
+    pub fn unspecialised(&self) -> Material {
+        self.finished(self.checked.unspecialised())
+    }
+
+    fn finished(&self, program: Program) -> Material {
+        let start = Instant::now();
         let curves = bake(program.sites(), self.engine.tier.precision());
-        let inner =
-            Inner { engine: self.engine, name: self.name().to_owned(), program, curves, reference: OnceLock::new() };
+        let inner = Inner {
+            engine: self.engine,
+            name: self.name().to_owned(),
+            program,
+            curves,
+            baked_in: start.elapsed(),
+            reference: OnceLock::new(),
+        };
         let material = Material { inner: Arc::new(inner) };
         if self.engine.tier == Tier::Reference {
             material.reference_curves();
         }
-        Ok(material)
+        material
     }
 }
 
@@ -148,6 +165,7 @@ struct Inner {
     name: String,
     program: Program,
     curves: Curves<f32>,
+    baked_in: Duration,
     reference: OnceLock<Curves<f64>>,
 }
 
@@ -213,6 +231,11 @@ impl Material {
 
     fn reference_curves(&self) -> &Curves<f64> {
         self.inner.reference.get_or_init(|| bake(self.inner.program.sites(), Precision::REFERENCE))
+    }
+
+    /// How long baking the albedo tables took.
+    pub fn bake_time(&self) -> Duration {
+        self.inner.baked_in
     }
 
     /// Memory the albedo tables take.

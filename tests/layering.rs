@@ -12,7 +12,7 @@ use overcoat::optics::Scalar;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-const TOLERANCE: Tolerance = Tolerance { error: 2e-5, evaluations: 60_000 };
+const TOLERANCE: Tolerance = Tolerance { error: 2e-5, evaluations: 12_000 };
 
 fn sheen(tree: &mut ClosureTree, r: f32) -> NodeId {
     lobe(tree, LobeKind::Sheen, &[("roughness", r)])

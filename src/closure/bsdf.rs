@@ -8,7 +8,7 @@ use super::layer::{LayerStack, LayeringRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{Frame, Lift, Real, Scalar, V3};
+use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -158,6 +158,38 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             pdf = l.probability.mul_add(l.lobe.pdf(local), pdf);
         });
         Eval { f_cos, pdf }
+    }
+
+    /// [`eval`](Self::eval) of many directions at once, eight at a time. Gives bit for bit what `eval` gives.
+    ///
+    /// # Panics
+    /// If `out` is shorter than `wi`.
+    pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval])
+    where
+        F32x8: Lift<S>,
+    {
+        assert!(out.len() >= wi.len(), "{} results for {} directions", out.len(), wi.len());
+        for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
+            let lane = |c: usize| F32x8(std::array::from_fn(|i| wi.get(i).map_or(0.0, |w| w[c])));
+            let mut pdf = F32x8::zero();
+            let f_cos = self.sum(V3::new(lane(0), lane(1), lane(2)), Cosine::Light, |l, local| {
+                pdf = F32x8::lift(l.probability).mul_add(l.lobe.pdf(local), pdf);
+            });
+            for i in 0..wi.len() {
+                out[i] = Eval { f_cos: f_cos.map(|f| f.0[i]), pdf: pdf.0[i] };
+            }
+        }
+    }
+
+    /// Memory in use: the parts a walk touches, not the room kept for more lobes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.ops)
+            + size_of_val(&*self.lobes)
+            + size_of_val(&*self.layers)
+            + size_of_val(&*self.frames)
+            + 2 * size_of::<V3<S>>()
+            + size_of::<Rgb<S>>()
+            + 4 * size_of::<usize>()
     }
 
     /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi|: what E_light integrates over ωo.

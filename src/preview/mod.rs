@@ -17,6 +17,7 @@ mod integrator;
 mod label;
 mod mesh;
 pub mod output;
+pub mod plot;
 mod sampler;
 mod scene;
 mod sphere;
@@ -29,6 +30,7 @@ pub use drape::drape_mesh;
 pub use environment::Environment;
 pub use image::Image;
 pub use mesh::{Mesh, Vertex};
+pub use studio::lamp;
 pub use surface::{Scatter, Surface};
 pub use tone::display;
 
@@ -199,7 +201,6 @@ pub struct Stage {
 impl Stage {
     /// Checks the settings, loads the environment and lays out the scene.
     pub fn new(settings: &RenderSettings) -> Result<Stage, RenderError> {
-        check(settings)?;
         let environment = match (settings.scene, &settings.env) {
             (Scene::Furnace, _) => Environment::uniform(1.0),
             (_, Some(path)) => {
@@ -207,6 +208,12 @@ impl Stage {
             }
             (_, None) => studio::environment(),
         };
+        Stage::lit_by(environment, settings)
+    }
+
+    /// Like [`new`](Self::new), lit by `environment` whatever the settings say.
+    pub fn lit_by(environment: Environment, settings: &RenderSettings) -> Result<Stage, RenderError> {
+        check(settings)?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(settings.threads)
             .build()

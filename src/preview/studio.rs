@@ -34,6 +34,21 @@ pub fn environment() -> Environment {
     Environment::from_pixels(WIDTH, HEIGHT, pixels.collect())
 }
 
+/// One small round light toward `toward`, `degrees` in radius, in a dim grey surrounding.
+pub fn lamp(toward: Vec3, degrees: f32) -> Environment {
+    let (width, height) = (2 * WIDTH, 2 * HEIGHT);
+    let toward = toward.normalize();
+    let edge = degrees.to_radians().cos();
+    // The same light falls on a surface that faces it, whatever its size.
+    let bright = 2.2 / (1.0 - edge) / std::f32::consts::TAU;
+    let pixels = (0..width * height).map(|i| {
+        let at = vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        let dir = from_square(at / vec2(width as f32, height as f32)).0;
+        Vec3::splat(if dir.dot(toward) > edge { bright } else { 0.02 })
+    });
+    Environment::from_pixels(width, height, pixels.collect())
+}
+
 fn radiance(dir: Vec3) -> Vec3 {
     const GROUND: Vec3 = vec3(0.16, 0.16, 0.165);
     const HORIZON: Vec3 = vec3(0.055, 0.056, 0.060);
