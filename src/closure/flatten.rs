@@ -102,40 +102,32 @@ pub fn flatten<'m, S: Scalar>(
 ) -> Result<Bsdf<'m, S>, TreeError> {
     tree.within_budget()?;
     let layers = tree.size(tree.root()).layers;
-    Ok(match layers {
-        0..=4 => Flattener::<S, 4>::run(tree, globals, wo, layering, curves, layers),
-        _ => Flattener::<S, { MAX_LAYERS as usize }>::run(tree, globals, wo, layering, curves, layers),
-    })
+    let zero = V3::new(S::zero(), S::zero(), S::zero());
+    let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
+    // Written in place: a BSDF with room for eight lobes is too large to pass around.
+    let mut bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
+    match layers {
+        0..=4 => Flattener::<S, 4>::new(tree, globals, curves, &mut bsdf).walk(),
+        _ => Flattener::<S, { MAX_LAYERS as usize }>::new(tree, globals, curves, &mut bsdf).walk(),
+    }
+    bsdf.finish();
+    Ok(bsdf)
 }
 
-struct Flattener<'t, 'm, S: Scalar, const D: usize> {
+struct Flattener<'t, 'b, 'm, S: Scalar, const D: usize> {
     tree: &'t ClosureTree,
     globals: &'t Globals,
     curves: &'m Curves<S>,
-    bsdf: Bsdf<'m, S>,
+    bsdf: &'b mut Bsdf<'m, S>,
     /// The walk for ωo, made while flattening.
     stack: LayerStack<S, D>,
     /// Normal and tangent as the tree gave them, per frame.
     frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
 }
 
-impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
-    fn run(
-        tree: &'t ClosureTree,
-        globals: &'t Globals,
-        wo: V3<S>,
-        layering: Layering,
-        curves: &'m Curves<S>,
-        layers: u16,
-    ) -> Bsdf<'m, S> {
-        let zero = V3::new(S::zero(), S::zero(), S::zero());
-        let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
-        let bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
-        let mut flattener =
-            Self { tree, globals, curves, bsdf, stack: LayerStack::default(), frame_keys: SmallVec::new() };
-        flattener.walk();
-        flattener.bsdf.finish();
-        flattener.bsdf
+impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
+    fn new(tree: &'t ClosureTree, globals: &'t Globals, curves: &'m Curves<S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
+        Flattener { tree, globals, curves, bsdf, stack: LayerStack::default(), frame_keys: SmallVec::new() }
     }
 
     fn walk(&mut self) {
