@@ -247,7 +247,7 @@ impl Material {
 fn bake<S: Scalar>(sites: &[Site], precision: Precision) -> Curves<S> {
     let mut curves = Curves::default();
     for (index, site) in sites.iter().enumerate() {
-        curves.set(index as u32, site.kind.curve(&site.values), precision);
+        curves.set(index as u32, site.kind.table(&site.values), precision);
     }
     curves
 }

@@ -4,6 +4,7 @@
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
 //! nodes around each, so that it never lies below either.
 
+use super::fibre::FibreTables;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
 use std::f64::consts::PI;
@@ -85,6 +86,8 @@ pub struct AlbedoCurve<S> {
     lo: S,
     /// 1/(hi − lo).
     inv_range: S,
+    /// For lobes that follow a thread; empty for all others.
+    pub(super) fibre: FibreTables<S>,
 }
 
 impl<S> Default for AlbedoCurve<S>
@@ -101,6 +104,7 @@ where
             rows: 0,
             lo: S::zero(),
             inv_range: S::zero(),
+            fibre: FibreTables::default(),
         }
     }
 }
@@ -127,7 +131,13 @@ impl<S: Real> AlbedoCurve<S> {
 
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
-        (self.view.len() + self.bound.len() + self.excess.len()) * size_of::<S>()
+        (self.view.len() + self.bound.len() + self.excess.len()) * size_of::<S>() + self.fibre.bytes()
+    }
+
+    /// The tables of a lobe that follows a thread.
+    #[inline(always)]
+    pub fn fibre(&self) -> &FibreTables<S> {
+        &self.fibre
     }
 
     #[inline(always)]
@@ -194,6 +204,7 @@ impl CurveSpec {
             rows,
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
+            fibre: FibreTables::default(),
         };
         let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos).bound();
         let lifts = shortfalls(&curve, truth, parameter, cosine);
@@ -303,7 +314,7 @@ impl Quadrature {
 }
 
 /// Maps over `items` on all cores, in order.
-fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub(super) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let chunk = items.len().div_ceil(threads).max(16);
     let f = &f;

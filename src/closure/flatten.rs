@@ -6,7 +6,7 @@
 use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
 use super::layer::{LayerStack, LayeringRule, TintRule};
 use super::tree::{ClosureTree, MAX_LAYERS, Node, NodeId, TreeError};
-use crate::albedo::{AlbedoCurve, CurveSpec, Precision};
+use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
@@ -17,7 +17,7 @@ use smallvec::SmallVec;
 /// The albedo curves of a material, found by the site that constructs the lobe.
 #[derive(Clone, Debug, Default)]
 pub struct Curves<S: Scalar> {
-    baked: Vec<(CurveSpec, AlbedoCurve<S>)>,
+    baked: Vec<(TableSpec, AlbedoCurve<S>)>,
     /// Index into `baked` per site.
     sites: Vec<Option<u32>>,
     none: AlbedoCurve<S>,
@@ -29,13 +29,13 @@ impl<S: Scalar> Curves<S> {
         let mut curves = Curves::default();
         for (site, kind, values) in tree.lobes() {
             let known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
-            curves.set(site, kind.curve(&known), precision);
+            curves.set(site, kind.table(&known), precision);
         }
         curves
     }
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
-    pub fn set(&mut self, site: u32, spec: Option<CurveSpec>, precision: Precision) {
+    pub fn set(&mut self, site: u32, spec: Option<TableSpec>, precision: Precision) {
         let Some(spec) = spec else { return };
         let index = match self.baked.iter().position(|(s, _)| *s == spec) {
             Some(i) => i,

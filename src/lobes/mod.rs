@@ -6,14 +6,17 @@
 
 pub mod registry;
 
+pub mod cylinder;
 pub mod diffuse;
 pub mod emission;
+pub mod fabric;
 pub mod oren_nayar;
 pub mod sheen;
+pub mod thread;
 pub mod translucent;
 pub mod transparent;
 
-use crate::albedo::{AlbedoCurve, CurveSpec};
+use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
 
@@ -34,6 +37,11 @@ pub trait Lobe<S: Real>: Sized + Copy {
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let _ = values;
         None
+    }
+
+    /// The table of whatever shape a parameter block needs: the [`curve`](Lobe::curve), unless a lobe says otherwise.
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        Self::curve(values).map(TableSpec::Cosine)
     }
 
     /// A color that multiplies the lobe and stays out of its albedo curve.
@@ -89,6 +97,11 @@ macro_rules! lobes {
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
+            pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values) ),* }
+            }
+
+            /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
                 match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
             }
@@ -159,8 +172,10 @@ lobes! {
     translucent::Translucent,
     transparent::Transparent,
     emission::Emission,
+    fabric::Fabric,
     oren_nayar::OrenNayar,
     sheen::Sheen,
+    thread::Thread,
 }
 
 impl LobeKind {
