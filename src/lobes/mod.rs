@@ -4,14 +4,20 @@
 //! Out: f, pdf, samples, albedo and – required – a bound on the albedo. A lobe never sees other lobes, weights,
 //! layers or world space.
 
+pub mod charlie;
+pub mod ltc;
 pub mod registry;
 
+mod charlie_terms;
 mod diffuse;
 mod emission;
+mod eon;
+mod ltc_tables;
 mod oren_nayar;
 mod sheen;
 mod translucent;
 mod transparent;
+mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec};
 use crate::optics::{Lift, Real, V3};
@@ -160,6 +166,8 @@ lobes! {
     emission::Emission,
     oren_nayar::OrenNayar,
     sheen::Sheen,
+    velvet::Velvet,
+    eon::Eon,
 }
 
 impl LobeKind {
