@@ -4,17 +4,23 @@
 //! Out: f, pdf, samples, albedo and – required – a bound on the albedo. A lobe never sees other lobes, weights,
 //! layers or world space.
 
+pub mod charlie;
+pub mod ltc;
 pub mod registry;
 
+mod charlie_terms;
 pub mod cylinder;
 pub mod diffuse;
 pub mod emission;
+pub mod eon;
 pub mod fabric;
+mod ltc_tables;
 pub mod oren_nayar;
 pub mod sheen;
 pub mod thread;
 pub mod translucent;
 pub mod transparent;
+pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -176,6 +182,8 @@ lobes! {
     oren_nayar::OrenNayar,
     sheen::Sheen,
     thread::Thread,
+    velvet::Velvet,
+    eon::Eon,
 }
 
 impl LobeKind {

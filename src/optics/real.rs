@@ -75,6 +75,15 @@ pub trait Real:
     fn powf(self, y: Self) -> Self {
         (y * self.ln()).exp()
     }
+    /// ln(1 + x) for x ≥ 0, precise for small x too.
+    fn ln_1p(self) -> Self {
+        // Kahan: the rounding of 1 + x is divided out again.
+        let u = Self::one() + self;
+        let d = u - Self::one();
+        Self::select(d.gt(Self::zero()), u.ln() * (self / d), self)
+    }
+    /// `table[index]` of a committed table; `index` holds whole numbers inside it.
+    fn pick(table: &[f32], index: Self) -> Self;
     /// x² .
     fn sq(self) -> Self {
         self * self
