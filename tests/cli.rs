@@ -369,3 +369,23 @@ fn every_example_is_a_documented_shader_that_keeps_energy() {
     }
     assert!(count >= 8, "{count} examples");
 }
+
+#[test]
+fn figures_come_with_numbers_and_an_index() {
+    let (_folder, path) = temporary("figures");
+    let folder = path.to_str().expect("a path");
+    let args = ["reproduce", folder, "--json", "--quiet", "--spp", "1", "--size", "16", "--only"];
+    for (name, file) in [
+        ("sheen-2", "sheen-2-distribution.svg"),
+        ("cylinder", "cylinder-refraction.csv"),
+        ("softening", "sheen-4-softening.png"),
+    ] {
+        let done = json(&[&args[..], &[name]].concat(), "");
+        assert!(done["figures"][0]["measured"].as_str().is_some_and(|m| !m.contains("NaN")), "{done}");
+        assert!(path.join(file).exists(), "{file}");
+        let index = std::fs::read_to_string(path.join("index.md")).expect("an index");
+        assert!(index.contains(file) && index.contains("- The source: ") && index.contains("- Measured: "));
+    }
+    let (status, message) = fails(&[&args[..], &["no-such-figure"]].concat(), "");
+    assert!(status == 2 && message.contains("sheen-2-distribution"), "{message}");
+}

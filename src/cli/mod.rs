@@ -8,6 +8,7 @@ mod input;
 mod lobes;
 mod output;
 mod render;
+mod reproduce;
 mod sample;
 mod tree;
 
@@ -117,6 +118,8 @@ enum Command {
     },
     /// Make a picture of the material.
     Render(render::RenderArgs),
+    /// Make the figures of the papers the lobes come from, with what they say and what was measured.
+    Reproduce(reproduce::ReproduceArgs),
 }
 
 /// Why a command stops.
@@ -148,6 +151,7 @@ pub fn main() -> ExitCode {
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
+        Command::Reproduce(args) => reproduce::run(&cli.global, args),
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
