@@ -19,7 +19,8 @@ const COSINES: [f64; 6] = [1.0, 0.8, 0.5, 0.2, 0.087_156, 0.008_727];
 
 /// Every lobe whose proposal is more than a cosine: name, kind, switches, and the share of the variance of uniform
 /// sampling it may have on average.
-const SUBJECTS: [(&str, LobeKind, &[(&str, f32)], f64); 8] = [
+type Subject = (&'static str, LobeKind, &'static [(&'static str, f32)], f64);
+const SUBJECTS: [Subject; 8] = [
     ("conty_kulla", LobeKind::Sheen, &[("model", 1.0)], 0.25),
     ("conty_kulla, softening 0", LobeKind::Sheen, &[("model", 1.0), ("softening", 0.0)], 0.35),
     ("refit", LobeKind::Sheen, &[("model", 2.0)], 0.25),

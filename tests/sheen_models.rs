@@ -98,8 +98,8 @@ fn albedo_errors<S: Scalar>(
 const FITTED: (f64, f64) = (0.07, 0.002);
 
 fn check_columns<S: Scalar>(tier: &str, precision: Precision, limit: f64) {
-    type Tree = fn(f64) -> ClosureTree;
-    let columns: [(&str, usize, Side, (f64, f64), Tree); 6] = [
+    type Column = (&'static str, usize, Side, (f64, f64), fn(f64) -> ClosureTree);
+    let columns: [Column; 6] = [
         ("E_fit", 2, Side::View, FITTED, |r| sheen(r, CONTY_KULLA, 0.0)),
         ("E_soft_view", 3, Side::View, FITTED, |r| sheen(r, CONTY_KULLA, 1.0)),
         ("E_soft_light", 4, Side::Light, FITTED, |r| sheen(r, CONTY_KULLA, 1.0)),
