@@ -4,6 +4,7 @@
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
 //! nodes around each, so that it never lies below either.
 
+use super::fibre::FibreTables;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
 use std::f64::consts::PI;
@@ -16,16 +17,20 @@ pub type Kernel = fn(&[f64; 4], V3<f64>, &[V3<f64>], &mut [f64]);
 pub struct Axis {
     /// Its place in [`CurveSpec::key`].
     pub index: usize,
-    /// Its range.
+    /// The lower end of its range, not negative.
     pub lo: f64,
+    /// The upper end.
     pub hi: f64,
 }
 
 /// What to bake: a lobe's f, the parameters it depends on, and which of them varies.
 #[derive(Clone, Copy, Debug)]
 pub struct CurveSpec {
+    /// The function to integrate.
     pub kernel: Kernel,
+    /// Its parameters.
     pub key: [f64; 4],
+    /// Which of them varies, if one does.
     pub axis: Option<Axis>,
     /// E_light equals E_view and need not be integrated.
     pub reciprocal: bool,
@@ -60,6 +65,7 @@ pub struct Precision {
     pub axis_nodes: usize,
     /// Quadrature points over the polar angle and over half the azimuth.
     pub polar: usize,
+    /// Quadrature points over half the azimuth.
     pub azimuth: usize,
     /// What the bound is lifted by in any case: the quadrature's error and the rounding of the evaluating type.
     pub margin: f64,
@@ -89,6 +95,8 @@ pub struct AlbedoCurve<S> {
     lo: S,
     /// 1/(hi − lo).
     inv_range: S,
+    /// For lobes that follow a thread; empty for all others.
+    pub(super) fibre: FibreTables<S>,
 }
 
 impl<S> Default for AlbedoCurve<S>
@@ -106,6 +114,7 @@ where
             rows: 0,
             lo: S::zero(),
             inv_range: S::zero(),
+            fibre: FibreTables::default(),
         }
     }
 }
@@ -139,6 +148,13 @@ impl<S: Real> AlbedoCurve<S> {
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
         (self.view.len() + self.bound.len() + self.excess.len() + self.extra.len()) * size_of::<S>()
+            + self.fibre.bytes()
+    }
+
+    /// The tables of a lobe that follows a thread.
+    #[inline(always)]
+    pub fn fibre(&self) -> &FibreTables<S> {
+        &self.fibre
     }
 
     #[inline(always)]
@@ -207,6 +223,7 @@ impl CurveSpec {
             rows,
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
+            fibre: FibreTables::default(),
         };
         let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos).bound();
         let lifts = shortfalls(&curve, truth, parameter, cosine);
@@ -248,7 +265,9 @@ fn shortfalls<S: Scalar>(
 /// E_view and E_light at one cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedos {
+    /// ∫ f(ω, ωi)·|cos θi| dωi.
     pub view: f64,
+    /// ∫ f(ωo, ω)·|cos θo| dωo.
     pub light: f64,
 }
 
@@ -266,6 +285,7 @@ pub struct Quadrature {
 }
 
 impl Quadrature {
+    /// The rule for a precision; its table sizes do not matter here.
     pub fn new(precision: Precision) -> Self {
         let polar = Rule::gauss_legendre(precision.polar);
         let azimuth = Rule::gauss_legendre(precision.azimuth);
@@ -321,7 +341,7 @@ impl Quadrature {
 }
 
 /// Maps over `items` on all cores, in order.
-fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub(super) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let chunk = items.len().div_ceil(threads).max(16);
     let f = &f;

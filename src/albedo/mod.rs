@@ -4,6 +4,8 @@
 //! name.
 
 pub mod curve;
+pub mod fibre;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
+pub use fibre::{COMPONENTS, FibreKey, FibreSpec, FibreTables, TableSpec};

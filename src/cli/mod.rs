@@ -2,6 +2,7 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod cost;
 mod eval;
 mod input;
 mod lobes;
@@ -104,6 +105,11 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
+    Cost {
+        /// The script; `-` reads stdin.
+        file: PathBuf,
+    },
     /// List the closures a script can call.
     Lobes {
         /// Only those of this name.
@@ -139,6 +145,7 @@ pub fn main() -> ExitCode {
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Cost { file } => cost::run(&cli.global, file),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
     };

@@ -9,17 +9,20 @@ pub mod ltc;
 pub mod registry;
 
 mod charlie_terms;
-mod diffuse;
-mod emission;
-mod eon;
+pub mod cylinder;
+pub mod diffuse;
+pub mod emission;
+pub mod eon;
+pub mod fabric;
 mod ltc_tables;
-mod oren_nayar;
-mod sheen;
-mod translucent;
-mod transparent;
-mod velvet;
+pub mod oren_nayar;
+pub mod sheen;
+pub mod thread;
+pub mod translucent;
+pub mod transparent;
+pub mod velvet;
 
-use crate::albedo::{AlbedoCurve, CurveSpec};
+use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
 
@@ -33,12 +36,18 @@ pub type Rgb32 = [f32; 3];
 /// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
 /// type parameter is what the lobe was prepared in; `f`, `pdf` and `albedo_bound` may be evaluated over lanes.
 pub trait Lobe<S: Real>: Sized + Copy {
+    /// The declared parameters.
     type Params: ClosureParams;
 
     /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let _ = values;
         None
+    }
+
+    /// The table of whatever shape a parameter block needs: the [`curve`](Lobe::curve), unless a lobe says otherwise.
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        Self::curve(values).map(TableSpec::Cosine)
     }
 
     /// A color that multiplies the lobe and stays out of its albedo curve.
@@ -82,7 +91,7 @@ macro_rules! lobes {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u16)]
-        pub enum LobeKind { $( $Lobe ),* }
+        pub enum LobeKind { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe ),* }
 
         impl LobeKind {
             /// Every lobe there is.
@@ -94,6 +103,11 @@ macro_rules! lobes {
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
+            pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values) ),* }
+            }
+
+            /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
                 match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
             }
@@ -117,7 +131,7 @@ macro_rules! lobes {
 
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
-        pub enum AnyLobe<S: Real> { $( $Lobe($module::$Lobe<S>) ),* }
+        pub enum AnyLobe<S: Real> { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>) ),* }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
@@ -164,13 +178,16 @@ lobes! {
     translucent::Translucent,
     transparent::Transparent,
     emission::Emission,
+    fabric::Fabric,
     oren_nayar::OrenNayar,
     sheen::Sheen,
+    thread::Thread,
     velvet::Velvet,
     eon::Eon,
 }
 
 impl LobeKind {
+    /// Whether the lobe scatters, transmits in one direction, or emits.
     pub fn class(self) -> LobeClass {
         self.spec().class
     }

@@ -132,6 +132,7 @@ pub struct F32x8(pub [f32; 8]);
 pub struct Mask8(pub [bool; 8]);
 
 impl F32x8 {
+    /// How many there are.
     pub const LANES: usize = 8;
 
     #[inline(always)]

@@ -76,7 +76,19 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         })
         .collect();
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
-    for c in &choices {
+    if choices.len() > 3 {
+        // One at a time, the others at their defaults; and all at either end.
+        let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
+        sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
+        for (i, c) in choices.iter().enumerate() {
+            sets.extend(c.iter().map(|v| {
+                let mut set = defaults.clone();
+                set[i] = *v;
+                set
+            }));
+        }
+    }
+    for c in choices.iter().filter(|_| choices.len() <= 3) {
         sets = sets.iter().flat_map(|s| c.iter().map(move |v| [s.as_slice(), &[*v]].concat())).collect();
     }
     let value = |set: &[f32], name: &str| free.iter().position(|f| f.name == name).map(|i| set[i]);

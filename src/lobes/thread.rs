@@ -1,0 +1,235 @@
+//! One family of threads lying side by side in the surface, along T: the thread model of Sadeghi et al. 2013.
+//!
+//! A cone of surface reflection about the thread, its width gamma_s, and light that went through the thread, colored by
+//! A and spread by gamma_v. Widths of 2–5° give the sharp streak of silk or a wound spool, 10–15° a linen yarn, 30° and
+//! more a dull, nearly diffuse fibre; kd = 0 keeps all transmitted light in the cone, kd = 1 sends it everywhere.
+//!
+//! As a surface: threads packed side by side shade each other by cos φ, seen and lit, and the seen width shrinks by
+//! cos φ too. Shadowing toward both sides, taken as independent, then leaves f equal to the thread's own function,
+//! which is symmetric: reciprocal as we count it. About half of what a thread reflects goes down between the others.
+//!
+//! Where this departs from the source: [`super::cylinder`] says how f is normalised. Toward the thread's ends the volume
+//! term still grows as 1/cos θ, so f is divided by max(1, E(ωo), E(ωi)). The tables of E know eta and the widths, not
+//! the colors; one of these may vary over the surface, and where several do, E is replaced by a bound over their whole
+//! range: darker near the thread's ends, but never gaining. Where f is divided, the albedo estimate is high.
+
+use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
+use super::registry::{ClosureParams, closure};
+use super::{Lobe, Rgb};
+use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
+use crate::optics::{Lift, Real, V3, sampling};
+
+closure! {
+    /// Dielectric threads lying along T: a streak of surface reflection and colored light from inside. One-sided:
+    /// black below the surface.
+    closure "thread" as ThreadParams {
+        /// Shading normal.
+        normal N;
+        /// Direction of the threads; its part along N is removed.
+        vector T;
+        /// Color of light that went through the thread.
+        color A = [0.3, 0.3, 0.3], in (0.0, 1.0);
+        /// Relative index of refraction of the fibre.
+        float eta = 1.5, in (1.0, 3.0);
+        /// How much of the light from inside leaves evenly rather than in the cone.
+        float kd = 0.3, in (0.0, 1.0);
+        /// Width of the surface reflection, in degrees: the standard deviation of θh.
+        float gamma_s = 12.0, in (1.0, 90.0);
+        /// Width of the cone of light from inside, in degrees.
+        float gamma_v = 24.0, in (1.0, 90.0);
+    }
+    source: "Sadeghi, Bisker, De Deken & Jensen 2013, eq. 1-5",
+    reciprocal: true,
+    class: Scatter,
+}
+
+/// The components of the tables: surface, forward, even.
+const SURFACE: usize = 0;
+const FORWARD: usize = 1;
+const EVEN: usize = 2;
+
+/// Where parameters that vary are bounded over their whole range, the components' albedos are at most this; the last
+/// two over max(cos θ, [`MIN_COS`]).
+const WHOLE_RANGE: [f64; COMPONENTS] = [1.6, 2.6, 1.6];
+const MIN_COS: f64 = 0.02;
+
+/// See [`ThreadParams`].
+#[derive(Clone, Copy, Debug)]
+pub struct Thread<S> {
+    cylinder: Cylinder<S>,
+    o: Around<S>,
+    /// 1 above the surface, else 0.
+    scale: S,
+    /// A·(1 − kd) and A·kd.
+    forward: Rgb<S>,
+    even: Rgb<S>,
+    /// max(1, E(ωo)) per channel.
+    excess: Rgb<S>,
+    /// Proposals for the surface and forward parts, and how often each is taken; the rest follows the cosine.
+    ridges: [Ridge<S>; 2],
+    shares: [S; 2],
+    /// The varying parameter's place in the table.
+    place: S,
+}
+
+/// The index in [eta, gamma_s, gamma_v] of the only one that is `None`.
+fn varying(values: &[Option<f32>]) -> Result<Option<usize>, ()> {
+    let spec = ThreadParams::SPEC;
+    let free: Vec<usize> = (0..3).filter(|i| values[spec.slot_of(NAMES[*i]).unwrap_or(0)].is_none()).collect();
+    if free.len() > 1 { Err(()) } else { Ok(free.first().copied()) }
+}
+
+const NAMES: [&str; 3] = ["eta", "gamma_s", "gamma_v"];
+const PARAMS: [usize; 3] = [3, 5, 6];
+
+/// The range of one of [`NAMES`].
+fn range(index: usize) -> (f64, f64) {
+    let p = &ThreadParams::SPEC.params[PARAMS[index]];
+    (p.min as f64, p.max as f64)
+}
+
+impl<S: Real> Thread<S> {
+    /// The albedos' weights in one channel.
+    #[inline(always)]
+    fn mix<L: Real + Lift<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
+        let forward = L::lift(self.forward[channel]) * parts[FORWARD];
+        L::lift(self.even[channel]).mul_add(parts[EVEN], parts[SURFACE] + forward)
+    }
+
+    /// A bound on the components' albedos.
+    #[inline(always)]
+    fn bounds<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> [L; COMPONENTS] {
+        if !curve.fibre().is_empty() {
+            return curve.fibre().bound(w, L::lift(self.place));
+        }
+        let cos = w.y.mul_add(w.y, w.z * w.z).sqrt().max(L::c(MIN_COS));
+        let [a, b, c] = WHOLE_RANGE.map(L::c);
+        [a, b / cos, c / cos].map(|e| L::select(w.z.gt(L::zero()), e, L::zero()))
+    }
+
+    fn kernel(key: &FibreKey, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
+        let mut values = [key[0], key[1], key[2]];
+        if key[3] >= 0.0 {
+            // A square: narrow widths change fastest.
+            let index = key[3] as usize;
+            let (lo, hi) = range(index);
+            values[index] = lo + (hi - lo) * values[index].powi(2);
+        }
+        let cylinder = Cylinder::<f64>::new(values[0], values[1], values[2], 0.0);
+        let o = Around::new(wo);
+        for (out, wi) in out.iter_mut().zip(wi) {
+            let Parts { surface, forward, even } = cylinder.parts(o, Around::new(*wi));
+            *out = [surface, forward, even];
+        }
+    }
+}
+
+impl<S: Real> Lobe<S> for Thread<S> {
+    type Params = ThreadParams;
+
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        let spec = ThreadParams::SPEC;
+        let axis = varying(values).ok()?;
+        let mut key = [0.0; 16];
+        for i in 0..3 {
+            let value = values[spec.slot_of(NAMES[i]).unwrap_or(0)];
+            key[i] = value.map_or(0.0, |v| spec.params[PARAMS[i]].clamp(0, v) as f64);
+        }
+        key[3] = axis.map_or(-1.0, |i| i as f64);
+        let degrees = |i: usize| if axis == Some(i) { 4.0 } else { key[i] };
+        Some(TableSpec::Fibre(FibreSpec {
+            kernel: Thread::<f64>::kernel,
+            key,
+            components: COMPONENTS,
+            axis,
+            width: 2.0 * degrees(1).min(degrees(2)).to_radians(),
+            around: true,
+            mirrored: true,
+        }))
+    }
+
+    fn new(params: &ThreadParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        let (zero, one, p) = (S::zero(), S::one(), params);
+        let [eta, gamma_s, gamma_v, kd] = [p.eta, p.gamma_s, p.gamma_v, p.kd].map(S::from_f32);
+        let o = Around::new(wo);
+        // Where a table runs over a parameter, only one is unknown to it; reading needs that one's place.
+        let place = |index: usize, value: S| {
+            let (lo, hi) = range(index);
+            ((value - S::c(lo)) / S::c(hi - lo)).safe_sqrt()
+        };
+        let places = [place(0, eta), place(1, gamma_s), place(2, gamma_v)];
+        let radians = S::c(2.0 * std::f64::consts::PI / 180.0);
+        let ridge = |gamma: S| Ridge::new(-o.angle(), gamma * radians);
+        let a = p.A.map(S::from_f32);
+        let mut lobe = Thread {
+            cylinder: Cylinder::new(eta, gamma_s, gamma_v, zero),
+            o,
+            scale: S::select(wo.z.gt(zero), one, zero),
+            forward: a.map(|a| a * (one - kd)),
+            even: a.map(|a| a * kd),
+            excess: [one; 3],
+            ridges: [ridge(gamma_s), ridge(gamma_v)],
+            shares: [zero; 2],
+            place: curve.fibre().axis_index().map_or(zero, |i| places[i.min(2)]),
+        };
+        let e = lobe.bounds(wo, curve);
+        for c in 0..3 {
+            lobe.excess[c] = lobe.mix(e, c).max(one);
+        }
+        let seen = if curve.fibre().is_empty() { [0.05, 0.7, 0.5].map(S::c) } else { e };
+        let mean = |x: Rgb<S>| (x[0] + x[1] + x[2]) * S::c(1.0 / 3.0);
+        let parts = [seen[SURFACE], seen[FORWARD] * mean(lobe.forward), seen[EVEN] * mean(lobe.even)];
+        // A tenth follows the cosine in any case: it bounds the weights.
+        let total = S::c(0.9) / (parts[0] + parts[1] + parts[2]).max(S::c(1e-9));
+        lobe.shares = [parts[0] * total, parts[1] * total];
+        lobe
+    }
+
+    #[inline(always)]
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        let Parts { surface, forward, even } = self.cylinder.parts(Around::<L>::lift(self.o), Around::new(wi));
+        let e = self.bounds(wi, curve);
+        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale), L::zero());
+        std::array::from_fn(|c| {
+            let excess = self.mix(e, c).max(L::lift(self.excess[c]));
+            scale * self.mix([surface, forward, even], c) / excess
+        })
+    }
+
+    /// A mixture of three: θi by each ridge with φi by its cosine, and the cosine over the hemisphere.
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let i = Around::new(wi);
+        let theta = i.angle();
+        let [a, b] = self.shares.map(L::lift);
+        let ridges = a * self.ridges[0].pdf(theta) + b * self.ridges[1].pdf(theta);
+        let inv = L::c(0.5) / i.cos.sq().max(L::c(1e-12));
+        let even = (L::one() - a - b) * L::c(std::f64::consts::FRAC_1_PI);
+        wi.z.max(L::zero()) * ridges.mul_add(inv, even)
+    }
+
+    fn sample(&self, u: [S; 2]) -> V3<S> {
+        let [a, b] = self.shares;
+        let (first, second) = (u[0].lt(a), u[0].lt(a + b));
+        let choose = |x: S, y: S, z: S| S::select(first, x, S::select(second, y, z));
+        let rest = (S::one() - a - b).max(S::c(1e-6));
+        let tiny = S::c(1e-9);
+        let v = choose(u[0] / a.max(tiny), (u[0] - a) / b.max(tiny), (u[0] - a - b) / rest);
+        let v = v.clamp(S::zero(), S::one());
+        let theta = S::select(first, self.ridges[0].sample(v), self.ridges[1].sample(v));
+        let (ridge, even) = (around_thread(theta, u[1]), sampling::cosine_hemisphere([v, u[1]]));
+        let pick = |ridge: S, even: S| S::select(second, ridge, even);
+        V3::new(pick(ridge.x, even.x), pick(ridge.y, even.y), pick(ridge.z, even.z))
+    }
+
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        let e = if curve.fibre().is_empty() { self.bounds(w, curve) } else { curve.fibre().view(w, self.place) };
+        let bound = self.bounds(w, curve);
+        std::array::from_fn(|c| self.mix(e, c) / self.mix(bound, c).max(S::one()))
+    }
+
+    #[inline(always)]
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        let e = self.bounds(w, curve);
+        std::array::from_fn(|c| self.mix(e, c).min(L::one()))
+    }
+}
