@@ -17,9 +17,10 @@
 //!
 //! Where this departs from the sources: under the fits both cosines are clamped to 1e-3 inside Λ and in the
 //! denominator, because the fitted Λ saturates toward grazing where the true one grows without bound, so that the raw
-//! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.99 and
-//! that of `refit` below 0.95, from both sides. A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204, and is untouched above. `zeltner`
-//! follows Zeltner, Burley & Chiang 2022 in form only: the table is fitted to `exact`, not to a volume of fibres.
+//! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.99 and that of
+//! `refit` below 0.95, from both sides. A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204,
+//! and is untouched above. `zeltner` follows Zeltner, Burley & Chiang 2022 in form only: the table is fitted to
+//! `exact`, not to a volume of fibres.
 //!
 //! The paper samples the hemisphere uniformly. Here all models are sampled by a transformed cosine mixed with a
 //! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
