@@ -5,10 +5,11 @@
 //! transformed cosine nearest to f·cos of the exact model. Both print what is left over. The second needs the first
 //! compiled in.
 
+use overcoat::albedo::AlbedoCurve;
 use overcoat::albedo::quadrature::Rule;
-use overcoat::lobes::LobeKind;
 use overcoat::lobes::charlie::{self, COS_TERMS, ROUGHNESS_TERMS};
 use overcoat::lobes::ltc::{self, COS_NODES, Ltc, PARAMS, ROUGHNESS_NODES};
+use overcoat::lobes::{AnyLobe, LobeKind};
 use overcoat::optics::V3;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -70,7 +71,8 @@ impl Shape {
             let slots = p.ty.slots();
             values.extend((0..slots).map(|i| given.unwrap_or(Some(p.default.get(i).copied().unwrap_or(1.0)))));
         }
-        let spec = kind.curve(&values).expect("a lobe with a kernel");
+        let spec = kind.curve(&values);
+        let known: Vec<f32> = values.iter().map(|v| v.unwrap_or(0.0)).collect();
         let wo = V3::polar(cos.max(1e-5), 0.0);
         let (polar, azimuth) = (Rule::gauss_legendre(56), Rule::gauss_legendre(40));
         let mut points = Vec::new();
@@ -78,7 +80,14 @@ impl Shape {
         for (u, wu) in polar.nodes.iter().zip(&polar.weights) {
             let mu = u * u * u;
             let ring: Vec<_> = azimuth.nodes.iter().map(|v| V3::polar(mu, PI * (1.0 - v * v))).collect();
-            (spec.kernel)(&spec.key, wo, &ring, &mut f);
+            match spec {
+                Some(spec) => (spec.kernel)(&spec.key, wo, &ring, &mut f),
+                None => {
+                    let none = AlbedoCurve::default();
+                    let lobe = AnyLobe::<f64>::new(kind, &known, wo, &none);
+                    f.iter_mut().zip(&ring).for_each(|(f, wi)| *f = lobe.f(*wi, &none)[0]);
+                }
+            }
             for ((w, f), (v, wv)) in ring.iter().zip(&f).zip(azimuth.nodes.iter().zip(&azimuth.weights)) {
                 points.push((*w, f * mu, wu * 3.0 * u * u * wv * 4.0 * PI * v));
             }
@@ -123,6 +132,8 @@ fn tables() -> String {
     proposals(&mut text, "SHEEN", "Proposals for the sheens without a softened terminator", sheen(3.0, 0.0));
     proposals(&mut text, "SOFTENED", "Proposals for the softened sheens", sheen(1.0, 1.0));
     proposals(&mut text, "VELVET", "Proposals for the velvet", velvet);
+    let eon = |cos: f64, r: f64| Shape::new(LobeKind::Eon, &[("roughness", r), ("albedo", 1.0)], cos);
+    proposals(&mut text, "EON", "Proposals for EON with white facets", eon);
     zeltner(&mut text, sheen(3.0, 0.0));
     text
 }

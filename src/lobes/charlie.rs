@@ -3,8 +3,8 @@
 //! In: roughness and cosines. Out: D, ln Λ of the paper's fit, and the exact Smith Λ. Every sheen model is put together
 //! from these; the file knows no lobe.
 //!
-//! The exact Λ is written Λ(μ) = s²·A·H(μ, r)/(μ·√(1 + a·s²)), s² = 1 − μ², with the square root taking out what
-//! changes fast, and H a Chebyshev series in both variables. Its coefficients are fitted to [`lambda_quadrature`] by
+//! The exact Λ is written Λ(μ) = D(0)·s²·H(μ, r)/(μ·√(1 + a·s²)), s² = 1 − μ², D(0) the largest value of D, with the
+//! square root taking out what changes fast, and H a Chebyshev series in both variables. Its coefficients are fitted to [`lambda_quadrature`] by
 //! `examples/fit_sheen.rs`; the series is within 3e-7 of the quadrature for r in [0.001, 1] and every angle.
 
 use super::charlie_terms::TERMS;
@@ -95,8 +95,9 @@ impl<S: Real> FittedLambda<S> {
 
 /// The lowest roughness the series of the exact Λ covers.
 pub const MIN_ROUGHNESS: f64 = 0.001;
-/// Terms over the cosine and over the roughness.
+/// Terms of the series over the cosine.
 pub const COS_TERMS: usize = 28;
+/// Terms of the series over the roughness.
 pub const ROUGHNESS_TERMS: usize = 18;
 /// Rows of a table over the roughness, equally spaced in ln r.
 const ROWS: usize = 64;

@@ -6,13 +6,15 @@
 //! E = 1 exactly for albedo 1, so an even environment hides the ball.
 //!
 //! Where this departs from the paper: its albedo term (sin θ/cos θ)(1 − sin³θ) − sin θ is written without the
-//! difference, so that nothing cancels at grazing angles, and sampling uses our own closed-form weights: a cosine lobe
-//! mixed with a uniform share that grows with roughness and grazing view.
+//! difference, so that nothing cancels at grazing angles, and it is sampled by a transformed cosine that keeps the
+//! horizon in place, mixed with a uniform share ([`super::ltc`]), where the paper clips one that does not.
 
+use super::ltc::Ltc;
+use super::ltc_tables::EON;
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Real, V3};
 use std::f64::consts::{FRAC_1_PI, PI};
 
 closure! {
@@ -50,8 +52,7 @@ pub struct Eon<S> {
     rho_ms: Rgb<S>,
     /// (1 − E(ωo))/(1 − mean E).
     missing_o: S,
-    /// Probability of a uniform direction.
-    uniform: S,
+    ltc: Ltc<S>,
 }
 
 impl<S: Real> Eon<S> {
@@ -92,7 +93,6 @@ impl<S: Real> Lobe<S> for Eon<S> {
         let lost = a * r * S::c(C1 - C2);
         let mean = S::one() - lost;
         let rho_ms = rho.map(|rho| rho.sq() * mean / (S::one() - rho * lost));
-        let grazing = S::one() - wo.z.clamp(S::zero(), S::one());
         let lobe = Eon {
             wo,
             rho,
@@ -102,7 +102,7 @@ impl<S: Real> Lobe<S> for Eon<S> {
             scale: Self::on_side(wo.z, S::c(FRAC_1_PI)),
             rho_ms,
             missing_o: S::zero(),
-            uniform: S::c(0.6) * r.sqrt() * grazing.sq(),
+            ltc: Ltc::proposal(&EON, wo, r),
         };
         let missing = S::one() - lobe.single(wo.z);
         Eon { missing_o: missing / lost.max(S::c(1e-6)), ..lobe }
@@ -122,19 +122,11 @@ impl<S: Real> Lobe<S> for Eon<S> {
 
     #[inline(always)]
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        let uniform = L::lift(self.uniform);
-        let cosine = sampling::cosine_hemisphere_pdf(wi.z);
-        uniform.mul_add(sampling::uniform_hemisphere_pdf(wi.z), (L::one() - uniform) * cosine)
+        self.ltc.pdf(wi)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
-        let uniform = u[0].lt(self.uniform);
-        let below = u[0] / self.uniform.max(S::c(1e-6));
-        let above = (u[0] - self.uniform) / (S::one() - self.uniform);
-        let again = S::select(uniform, below, above).clamp(S::zero(), S::c(0.999_999_94));
-        let (flat, cosine) = (sampling::uniform_hemisphere([again, u[1]]), sampling::cosine_hemisphere([again, u[1]]));
-        let pick = |a, b| S::select(uniform, a, b);
-        V3::new(pick(flat.x, cosine.x), pick(flat.y, cosine.y), pick(flat.z, cosine.z))
+        self.ltc.sample(u)
     }
 
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {

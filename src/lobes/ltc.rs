@@ -8,9 +8,11 @@
 use crate::optics::{Lift, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
-/// Nodes of a table over √μ and over ln r, from [`MIN_ROUGHNESS`] to 1; lower roughness reads as that.
+/// Nodes of a table over √μ.
 pub const COS_NODES: usize = 16;
+/// Nodes of a table over ln r, from [`MIN_ROUGHNESS`] to 1.
 pub const ROUGHNESS_NODES: usize = 16;
+/// The lowest roughness of a table; lower ones read as this.
 pub const MIN_ROUGHNESS: f64 = 0.02;
 /// Numbers per node: a, b, c and one more.
 pub const PARAMS: usize = 4;

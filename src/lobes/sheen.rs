@@ -7,22 +7,23 @@
 //! The models share D and differ in G. Each keeps the roughness to its own range, so that a value below its floor is
 //! taken as the floor:
 //!
-//! | model         | G                                                        | r from | softening | gains? |
-//! |---------------|----------------------------------------------------------|--------|-----------|--------|
-//! | `conty_kulla` | the paper's fit of Smith's Λ (eq. 3, Table 1)            | 0.07   | eq. 4     | no     |
-//! | `refit`       | the same rows under a better weight over r               | 0.02   | eq. 4     | no     |
-//! | `exact`       | Smith's Λ itself                                         | 0.001  | ignored   | no     |
-//! | `charlie_v`   | Narkowicz 2018: G/(4μoμi) = 1/(4(μo + μi − μoμi))        | 0.02   | ignored   | bounded|
-//! | `zeltner`     | a transformed cosine fitted to `exact`, scaled by its E  | 0.05   | ignored   | bounded|
+//! | model | G | r from | softening | gains? |
+//! |---|---|---|---|---|
+//! | `conty_kulla` | the paper's fit of Smith's Λ (eq. 3, Table 1) | 0.07 | eq. 4 | no |
+//! | `refit` | the same rows under a better weight over r | 0.02 | eq. 4 | no |
+//! | `exact` | Smith's Λ itself | 0.001 | ignored | no |
+//! | `charlie_v` | Narkowicz 2018: G/(4μoμi) = 1/(4(μo + μi − μoμi)) | 0.02 | ignored | bounded |
+//! | `zeltner` | a transformed cosine fitted to `exact`, scaled by its E | 0.05 | ignored | bounded |
 //!
 //! Where this departs from the sources: under the fits both cosines are clamped to 1e-3 inside Λ and in the
 //! denominator, because the fitted Λ saturates toward grazing where the true one grows without bound, so that the raw
-//! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.95 from both sides.
-//! A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204, and is untouched above. `zeltner`
-//! follows Zeltner, Burley & Chiang 2022 in form only: the table is fitted to `exact`, not to a volume of fibres.
+//! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.99 and that of
+//! `refit` below 0.95, from both sides. A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204,
+//! and is untouched above. `zeltner` follows Zeltner, Burley & Chiang 2022 in form only: the table is fitted to
+//! `exact`, not to a volume of fibres.
 //!
 //! The paper samples the hemisphere uniformly. Here all models are sampled by a transformed cosine mixed with a
-//! uniform share ([`super::ltc`]), at a fifth to a tenth of the variance.
+//! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
