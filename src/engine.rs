@@ -14,6 +14,7 @@ use crate::span::Source;
 use glam::Vec3;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 /// What speed is traded for. The model is the same in every tier, and every tier conserves energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -96,6 +97,7 @@ pub struct Shader {
 }
 
 impl Shader {
+    /// Its name; the script’s file name if the script does not name it.
     pub fn name(&self) -> &str {
         self.checked.name()
     }
@@ -105,6 +107,7 @@ impl Shader {
         self.checked.params()
     }
 
+    /// The script, for showing messages.
     pub fn source(&self) -> &Source {
         &self.source
     }
@@ -123,14 +126,30 @@ impl Shader {
             .checked
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
+        Ok(self.finished(program))
+    }
+
+    /// The material with every parameter left open, read at every point: what specialising is measured against.
+    pub fn unspecialised(&self) -> Material {
+        self.finished(self.checked.unspecialised())
+    }
+
+    fn finished(&self, program: Program) -> Material {
+        let start = Instant::now();
         let curves = bake(program.sites(), self.engine.tier.precision());
-        let inner =
-            Inner { engine: self.engine, name: self.name().to_owned(), program, curves, reference: OnceLock::new() };
+        let inner = Inner {
+            engine: self.engine,
+            name: self.name().to_owned(),
+            program,
+            curves,
+            baked_in: start.elapsed(),
+            reference: OnceLock::new(),
+        };
         let material = Material { inner: Arc::new(inner) };
         if self.engine.tier == Tier::Reference {
             material.reference_curves();
         }
-        Ok(material)
+        material
     }
 }
 
@@ -146,14 +165,17 @@ struct Inner {
     name: String,
     program: Program,
     curves: Curves<f32>,
+    baked_in: Duration,
     reference: OnceLock<Curves<f64>>,
 }
 
 impl Material {
+    /// The name of the shader it came from.
     pub fn name(&self) -> &str {
         &self.inner.name
     }
 
+    /// The tier of the engine that made it.
     pub fn tier(&self) -> Tier {
         self.inner.engine.tier
     }
@@ -204,11 +226,16 @@ impl Material {
         let i = wo.map(|x| -x.to_f32());
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
         let tree = self.tree(&globals)?;
-        Ok(flatten(&tree, &globals, wo, self.inner.engine.layering, curves)?)
+        flatten(&tree, &globals, wo, self.inner.engine.layering, curves)
     }
 
     fn reference_curves(&self) -> &Curves<f64> {
         self.inner.reference.get_or_init(|| bake(self.inner.program.sites(), Precision::REFERENCE))
+    }
+
+    /// How long baking the albedo tables took.
+    pub fn bake_time(&self) -> Duration {
+        self.inner.baked_in
     }
 
     /// Memory the albedo tables take.
@@ -228,7 +255,9 @@ fn bake<S: Scalar>(sites: &[Site], precision: Precision) -> Curves<S> {
 /// What is wrong with a script.
 #[derive(Clone, Debug)]
 pub struct ScriptError {
+    /// The script.
     pub source: Arc<Source>,
+    /// All that is wrong, with places.
     pub diagnostics: Vec<Diagnostic>,
 }
 

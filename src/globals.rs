@@ -16,6 +16,7 @@ pub struct Globals {
     pub i: Vec3,
     /// Surface parameters.
     pub u: f32,
+    /// The second surface parameter.
     pub v: f32,
     /// ∂P/∂u: where azimuths and tangents are measured from.
     pub dpdu: Vec3,

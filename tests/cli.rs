@@ -146,6 +146,25 @@ fn lobes_lists_every_closure() {
 }
 
 #[test]
+fn cost_measures_before_and_after() {
+    let cost = json(&["cost", &example("satin_lining.osl"), "--json", "--set", "softness=0.1"], "");
+    assert_eq!(cost["constant"], false);
+    assert_eq!(cost["globals"], serde_json::json!(["N", "u"]));
+    assert_eq!(cost["lobes"], serde_json::json!(["diffuse", "sheen_bsdf"]));
+    for side in [&cost, &cost["unspecialised"]] {
+        for key in ["shade", "flatten", "eval", "sample", "eval_batch"] {
+            assert!(side["ns"][key].as_f64().is_some_and(|ns| ns > 0.0), "{key}: {side}");
+        }
+        assert!(side["bytes"]["bsdf"].as_u64().is_some_and(|b| b > 100 && b < 2000));
+    }
+    let constant = json(&["cost", "-", "--json"], VELVET);
+    assert_eq!(constant["constant"], true);
+    // One curve for the one roughness, against a table over all of them.
+    let tables = |c: &Value| c["bytes"]["tables"].as_u64().expect("bytes");
+    assert!(tables(&constant) * 8 < tables(&cost));
+}
+
+#[test]
 fn parameters_are_set_by_name() {
     let file = example("velvet.osl");
     let args = ["tree", &file, "--json", "--set", "roughness=0.5", "--set", "base_color=0.1,0.2,0.3"];
@@ -349,4 +368,24 @@ fn every_example_is_a_documented_shader_that_keeps_energy() {
         }
     }
     assert!(count >= 8, "{count} examples");
+}
+
+#[test]
+fn figures_come_with_numbers_and_an_index() {
+    let (_folder, path) = temporary("figures");
+    let folder = path.to_str().expect("a path");
+    let args = ["reproduce", folder, "--json", "--quiet", "--spp", "1", "--size", "16", "--only"];
+    for (name, file) in [
+        ("sheen-2", "sheen-2-distribution.svg"),
+        ("cylinder", "cylinder-refraction.csv"),
+        ("softening", "sheen-4-softening.png"),
+    ] {
+        let done = json(&[&args[..], &[name]].concat(), "");
+        assert!(done["figures"][0]["measured"].as_str().is_some_and(|m| !m.contains("NaN")), "{done}");
+        assert!(path.join(file).exists(), "{file}");
+        let index = std::fs::read_to_string(path.join("index.md")).expect("an index");
+        assert!(index.contains(file) && index.contains("- The source: ") && index.contains("- Measured: "));
+    }
+    let (status, message) = fails(&[&args[..], &["no-such-figure"]].concat(), "");
+    assert!(status == 2 && message.contains("sheen-2-distribution"), "{message}");
 }

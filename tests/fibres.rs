@@ -178,29 +178,14 @@ fn total_reflectance_matches_the_table() {
 #[test]
 fn refraction_keeps_the_angle_along_the_thread() {
     let mut rng = Pcg64Mcg::seed_from_u64(13);
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let refract = |d: [f64; 3], n: [f64; 3], eta: f64| {
-        let c = -dot(d, n);
-        let k = 1.0 - eta * eta * (1.0 - c * c);
-        (k > 0.0).then(|| std::array::from_fn::<f64, 3, _>(|i| eta * d[i] + (eta * c - k.sqrt()) * n[i]))
-    };
     let (mut worst, mut count) = (0.0f64, 0);
     while count < 200_000 {
-        let [x, h, a] = [(); 3].map(|_| rng.random::<f64>());
-        let (x, eta, turn) = (1.98 * x - 0.99, 1.1 + rng.random::<f64>(), a * std::f64::consts::TAU);
+        let [x, h, a, eta] = [(); 4].map(|_| rng.random::<f64>());
+        let (x, turn) = (1.98 * x - 0.99, a * std::f64::consts::TAU);
         let across = (1.0 - x * x).sqrt();
-        let d = [x, across * turn.cos(), across * turn.sin()];
-        // Where it meets the unit circle, at an offset h from the axis.
-        let h = 1.998 * h - 0.999;
-        let (u, v) = ([turn.cos(), turn.sin()], [-turn.sin(), turn.cos()]);
-        let back = (1.0 - h * h).sqrt();
-        let n = [0.0, h * v[0] - back * u[0], h * v[1] - back * u[1]];
-        let Some(inside) = refract(d, n, 1.0 / eta) else { continue };
-        let flat = inside[1].hypot(inside[2]);
-        let t = -2.0 * (n[1] * inside[1] + n[2] * inside[2]) / (flat * flat);
-        let out = [0.0, n[1] + t * inside[1], n[2] + t * inside[2]];
-        let Some(leaving) = refract(inside, out.map(|x| -x), eta) else { continue };
-        worst = worst.max((leaving[0] - d[0]).abs());
+        let way = [x, across * turn.cos(), across * turn.sin()];
+        let Some(leaving) = cylinder::through_smooth_cylinder(way, 1.998 * h - 0.999, 1.1 + eta) else { continue };
+        worst = worst.max((leaving[0] - x).abs());
         count += 1;
     }
     println!("{count} rays, largest change of sin θ {worst:.1e}");

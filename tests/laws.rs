@@ -126,6 +126,26 @@ fn lanes_give_what_scalars_give() {
     }
 }
 
+#[test]
+fn a_batch_gives_what_single_calls_give() {
+    let shader =
+        overcoat::Engine::new().compile("s", "Ci = sheen(0.5*diffuse(N) + 0.4*oren_nayar(N, u), N, 1, 0.2 + u);");
+    let material = shader.expect("compiles").material(&[]).expect("specialises");
+    let globals = overcoat::Globals { u: 0.4, ..Default::default() };
+    let bsdf = material.shade(&globals, turned(0.4).into()).expect("within budget");
+    let mut rng = Pcg64Mcg::seed_from_u64(6);
+    for count in [0, 1, 7, 8, 9, 100] {
+        let wi: Vec<[f32; 3]> = (0..count).map(|_| overcoat::audit::chi2::direction(&mut rng)).collect();
+        let mut out = vec![bsdf.eval([0.0, 0.0, 1.0]); count];
+        bsdf.eval_batch(&wi, &mut out);
+        for (wi, out) in wi.iter().zip(&out) {
+            let one = bsdf.eval(*wi);
+            assert_eq!(one.f_cos.map(f32::to_bits), out.f_cos.map(f32::to_bits));
+            assert_eq!(one.pdf.to_bits(), out.pdf.to_bits());
+        }
+    }
+}
+
 /// Numbers a host or a script may hand over by mistake.
 const ODD: [f32; 17] = [
     f32::NAN,

@@ -93,9 +93,10 @@ fn modules_use_only_what_they_may() {
 }
 
 #[test]
-fn only_the_parser_names_the_grammars_rules() {
+fn only_the_parser_knows_pest() {
     for (file, code) in library() {
-        assert!(file == "syntax/parse.rs" || !code.contains("Rule::"), "src/{file}");
+        let code: String = code.lines().filter(|l| !l.trim_start().starts_with("//")).collect();
+        assert!(file == "syntax/parse.rs" || !code.contains("pest"), "src/{file}");
     }
 }
 
@@ -110,8 +111,9 @@ fn files_stay_readable() {
         let lines = text.lines().count();
         assert!(lines <= 600, "{}: {lines} lines", file.display());
         assert!(text.starts_with("//!") || file.ends_with("lib.rs"), "{}: opens without its story", file.display());
-        let banner =
-            text.lines().find(|l| l.trim_start().starts_with("//") && (l.contains("=====") || l.contains("-----")));
+        let banner = text.lines().find(|l| {
+            l.trim_start().starts_with("//") && !l.contains('|') && (l.contains("=====") || l.contains("-----"))
+        });
         assert!(banner.is_none() || file.ends_with("tidy.rs"), "{}: {banner:?}", file.display());
     }
 }

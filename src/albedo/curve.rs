@@ -17,22 +17,33 @@ pub type Kernel = fn(&[f64; 4], V3<f64>, &[V3<f64>], &mut [f64]);
 pub struct Axis {
     /// Its place in [`CurveSpec::key`].
     pub index: usize,
-    /// Its range.
+    /// The lower end of its range, not negative.
     pub lo: f64,
+    /// The upper end.
     pub hi: f64,
 }
 
 /// What to bake: a lobe's f, the parameters it depends on, and which of them varies.
 #[derive(Clone, Copy, Debug)]
 pub struct CurveSpec {
+    /// The function to integrate.
     pub kernel: Kernel,
+    /// Its parameters.
     pub key: [f64; 4],
+    /// Which of them varies, if one does.
     pub axis: Option<Axis>,
     /// E_light equals E_view and need not be integrated.
     pub reciprocal: bool,
     /// The lobe gains energy somewhere, and is therefore divided by max(1, Ē(ωo), Ē(ωi)); see [`AlbedoCurve::excess`].
     /// The curve is that of the divided lobe.
     pub bounded: bool,
+    /// Numbers the lobe wants beside its albedos, from the key and the axis; see [`AlbedoCurve::extra`].
+    pub extra: fn(&[f64; 4], Option<Axis>) -> Vec<f64>,
+}
+
+/// For [`CurveSpec::extra`]: nothing.
+pub fn no_extra(_: &[f64; 4], _: Option<Axis>) -> Vec<f64> {
+    vec![]
 }
 
 impl PartialEq for CurveSpec {
@@ -54,6 +65,7 @@ pub struct Precision {
     pub axis_nodes: usize,
     /// Quadrature points over the polar angle and over half the azimuth.
     pub polar: usize,
+    /// Quadrature points over half the azimuth.
     pub azimuth: usize,
     /// What the bound is lifted by in any case: the quadrature's error and the rounding of the evaluating type.
     pub margin: f64,
@@ -76,6 +88,8 @@ pub struct AlbedoCurve<S> {
     bound: Vec<S>,
     /// Empty unless [`CurveSpec::bounded`].
     excess: Vec<S>,
+    /// What [`CurveSpec::extra`] gave.
+    extra: Vec<S>,
     cos_nodes: usize,
     rows: usize,
     lo: S,
@@ -95,6 +109,7 @@ where
             view: vec![],
             bound: vec![],
             excess: vec![],
+            extra: vec![],
             cos_nodes: 0,
             rows: 0,
             lo: S::zero(),
@@ -124,9 +139,16 @@ impl<S: Real> AlbedoCurve<S> {
         self.read(&self.excess, w.z, parameter).max(L::one())
     }
 
+    /// What the lobe asked for beside its albedos; empty if it asked for nothing.
+    #[inline(always)]
+    pub fn extra(&self) -> &[S] {
+        &self.extra
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
-        (self.view.len() + self.bound.len() + self.excess.len()) * size_of::<S>() + self.fibre.bytes()
+        (self.view.len() + self.bound.len() + self.excess.len() + self.extra.len()) * size_of::<S>()
+            + self.fibre.bytes()
     }
 
     /// The tables of a lobe that follows a thread.
@@ -164,7 +186,8 @@ impl<S: Real> AlbedoCurve<S> {
 impl CurveSpec {
     /// Integrates the albedos at the nodes, then measures the interpolation between them and lifts the bound by it.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> AlbedoCurve<S> {
-        let raw = self.bake_with(precision, &AlbedoCurve::default());
+        let extra = (self.extra)(&self.key, self.axis).into_iter().map(S::c).collect();
+        let raw = AlbedoCurve { extra, ..self.bake_with(precision, &AlbedoCurve::default()) };
         if !self.bounded {
             return raw;
         }
@@ -175,7 +198,7 @@ impl CurveSpec {
         for b in &mut curve.bound {
             *b = b.min(S::one());
         }
-        AlbedoCurve { excess: excess.excess, ..curve }
+        AlbedoCurve { excess: excess.excess, extra: excess.extra, ..curve }
     }
 
     fn bake_with<S: Scalar>(&self, precision: Precision, excess: &AlbedoCurve<S>) -> AlbedoCurve<S> {
@@ -195,6 +218,7 @@ impl CurveSpec {
             view: albedos.iter().map(|a| S::c(a.view)).collect(),
             bound: albedos.iter().map(|a| S::c(a.bound())).collect(),
             excess: vec![],
+            extra: vec![],
             cos_nodes: n,
             rows,
             lo: S::c(lo),
@@ -210,8 +234,8 @@ impl CurveSpec {
     }
 }
 
-/// How much every node of the bound must rise so that no probe between the nodes lies above it, with a fifth more
-/// for what lies between the probes.
+/// How much every node of the bound must rise so that nothing between the nodes lies above it: twice what the probes in
+/// the middle see, because a kink close to a node shows there with half its height.
 fn shortfalls<S: Scalar>(
     curve: &AlbedoCurve<S>,
     truth: impl Fn(f64, f64) -> f64 + Sync,
@@ -231,7 +255,7 @@ fn shortfalls<S: Scalar>(
         for row in [half_row / 2, half_row.div_ceil(2)] {
             for corner in [node, node + 1] {
                 let lift = &mut lifts[row * curve.cos_nodes + corner];
-                *lift = lift.max(1.2 * shortfall);
+                *lift = lift.max(2.0 * shortfall);
             }
         }
     }
@@ -241,7 +265,9 @@ fn shortfalls<S: Scalar>(
 /// E_view and E_light at one cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedos {
+    /// ∫ f(ω, ωi)·|cos θi| dωi.
     pub view: f64,
+    /// ∫ f(ωo, ω)·|cos θo| dωo.
     pub light: f64,
 }
 
@@ -253,21 +279,19 @@ impl Albedos {
 
 /// A product rule over the hemisphere: μ = u³ (grading toward grazing) and half the azimuth.
 pub struct Quadrature {
-    cosines: Vec<(f64, f64)>,
+    /// Over u = μ^⅓.
+    polar: Rule,
     azimuths: Vec<(f64, f64)>,
 }
 
 impl Quadrature {
+    /// The rule for a precision; its table sizes do not matter here.
     pub fn new(precision: Precision) -> Self {
         let polar = Rule::gauss_legendre(precision.polar);
         let azimuth = Rule::gauss_legendre(precision.azimuth);
-        let cosine = |(&u, &w): (&f64, &f64)| (u * u * u, w * 3.0 * u * u);
         // The azimuth is graded toward π, where two grazing directions face each other and the half vector turns fast.
         let angle = |(&v, &w): (&f64, &f64)| (PI * (1.0 - v * v), w * 2.0 * v * 2.0 * PI);
-        Quadrature {
-            cosines: polar.nodes.iter().zip(&polar.weights).map(cosine).collect(),
-            azimuths: azimuth.nodes.iter().zip(&azimuth.weights).map(angle).collect(),
-        }
+        Quadrature { polar, azimuths: azimuth.nodes.iter().zip(&azimuth.weights).map(angle).collect() }
     }
 
     /// Both albedos at `cos` with the varying parameter, if there is one, at `parameter`.
@@ -283,7 +307,9 @@ impl Quadrature {
         let mut albedos = Albedos { view: 0.0, light: 0.0 };
         let excess_at = |cos: f64| excess.excess(V3::polar(S::c(cos), S::zero()), S::c(parameter)).to_f64();
         let excess_here = excess_at(cos);
-        for &(mu, weight) in &self.cosines {
+        // A divided lobe has a kink where its two directions are equally steep.
+        let kink = if excess.excess.is_empty() { 1.0 } else { cos.clamp(0.0, 1.0).cbrt() };
+        for (mu, weight) in self.cosines(0.0, kink).chain(self.cosines(kink, 1.0)) {
             let weight = weight / excess_at(mu).max(excess_here);
             let ring: Vec<V3<f64>> = self.azimuths.iter().map(|a| V3::polar(mu, a.0)).collect();
             (spec.kernel)(&key, here, &ring, &mut values);
@@ -298,6 +324,15 @@ impl Quadrature {
             albedos.light = albedos.view;
         }
         albedos
+    }
+
+    /// Cosines and weights for u = μ^⅓ in `[lo, hi]`; none for an empty interval.
+    fn cosines(&self, lo: f64, hi: f64) -> impl Iterator<Item = (f64, f64)> {
+        let nodes = self.polar.nodes.iter().zip(&self.polar.weights);
+        nodes.take_while(move |_| hi > lo).map(move |(u, w)| {
+            let u = lo + (hi - lo) * u;
+            (u * u * u, w * (hi - lo) * 3.0 * u * u)
+        })
     }
 
     fn over_azimuth(&self, values: &[f64]) -> f64 {
@@ -323,7 +358,8 @@ mod tests {
     use crate::lobes::LobeKind;
 
     fn sheen(roughness: Option<f32>) -> CurveSpec {
-        let mut values = [Some(1.0); 8];
+        let mut values = [Some(1.0); 10];
+        values[7] = Some(0.0);
         values[6] = roughness;
         LobeKind::Sheen.curve(&values).unwrap()
     }

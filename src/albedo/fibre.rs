@@ -24,7 +24,9 @@ pub type FibreKernel = fn(&FibreKey, V3<f64>, &[V3<f64>], &mut [[f64; COMPONENTS
 /// What to bake for a lobe that follows a thread.
 #[derive(Clone, Copy, Debug)]
 pub struct FibreSpec {
+    /// The components of f.
     pub kernel: FibreKernel,
+    /// What the kernel is given.
     pub key: FibreKey,
     /// How many of the components are in use.
     pub components: usize,

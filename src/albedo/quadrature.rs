@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 /// Nodes and weights of a Gauss–Legendre rule on [0, 1].
 #[derive(Clone, Debug)]
 pub struct Rule {
+    /// Where to evaluate, ascending.
     pub nodes: Vec<f64>,
+    /// What each value counts; the sum is 1.
     pub weights: Vec<f64>,
 }
 

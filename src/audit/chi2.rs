@@ -12,7 +12,9 @@ use std::f64::consts::TAU;
 pub struct Chi2 {
     /// Probability of a deviation at least this large if sampler and density agree.
     pub p_value: f64,
+    /// Pearson's statistic.
     pub statistic: f64,
+    /// Its degrees of freedom.
     pub degrees: usize,
     /// ∫ pdf over the sphere: 1 − the delta probability, if no sample is lost.
     pub pdf_integral: f64,

@@ -27,12 +27,14 @@ const KRONROD: [f64; 8] = [
     0.209_482_141_084_727_82,
 ];
 const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_93, 0.417_959_183_673_469_4];
+    [0.129_484_966_168_869_7, 0.279_705_391_489_276_7, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// An integral per channel, with an estimate of its absolute error (the largest over the channels).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integral {
+    /// The integral per channel.
     pub value: [f64; 3],
+    /// Estimated absolute error, the largest over the channels.
     pub error: f64,
     /// The error could not be brought below the tolerance within the budget.
     pub exhausted: bool,

@@ -24,6 +24,7 @@ pub enum Side {
 /// A directional albedo with an estimate of its absolute error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Albedo {
+    /// Per channel.
     pub value: Rgb<f64>,
     /// The largest over the channels.
     pub error: f64,

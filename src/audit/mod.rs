@@ -16,6 +16,7 @@ use crate::optics::Scalar;
 
 /// What an audit looks at: a BSDF for every ωo (world space, unit). Any `Fn([S; 3]) -> Bsdf<S>` is one.
 pub trait Subject<'m, S: Scalar> {
+    /// The BSDF seen from `wo`.
     fn bsdf(&self, wo: [S; 3]) -> Bsdf<'m, S>;
 }
 

@@ -2,11 +2,13 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod cost;
 mod eval;
 mod input;
 mod lobes;
 mod output;
 mod render;
+mod reproduce;
 mod sample;
 mod tree;
 
@@ -104,6 +106,11 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
+    Cost {
+        /// The script; `-` reads stdin.
+        file: PathBuf,
+    },
     /// List the closures a script can call.
     Lobes {
         /// Only those of this name.
@@ -111,6 +118,8 @@ enum Command {
     },
     /// Make a picture of the material.
     Render(render::RenderArgs),
+    /// Make the figures of the papers the lobes come from, with what they say and what was measured.
+    Reproduce(reproduce::ReproduceArgs),
 }
 
 /// Why a command stops.
@@ -139,8 +148,10 @@ pub fn main() -> ExitCode {
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Cost { file } => cost::run(&cli.global, file),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
+        Command::Reproduce(args) => reproduce::run(&cli.global, args),
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,

@@ -1,4 +1,4 @@
-//! From a tree and one ωo to the list a [`Bsdf`](super::Bsdf) walks.
+//! From a tree and one ωo to the list a `Bsdf` walks.
 //!
 //! One pass, top before base, over an explicit stack. Every lobe is prepared once; lobes that share a normal and a
 //! tangent share a frame.
@@ -66,7 +66,9 @@ impl<S: Scalar> Curves<S> {
 /// How layers scale: chosen per material, not per shading point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Layering {
+    /// How a layer scales its base.
     pub rule: LayeringRule,
+    /// Which channels of a top's albedo it answers to.
     pub tint: TintRule,
 }
 
@@ -100,45 +102,37 @@ pub fn flatten<'m, S: Scalar>(
 ) -> Result<Bsdf<'m, S>, TreeError> {
     tree.within_budget()?;
     let layers = tree.size(tree.root()).layers;
-    Ok(match layers {
-        0..=4 => Flattener::<S, 4>::run(tree, globals, wo, layering, curves, layers),
-        _ => Flattener::<S, { MAX_LAYERS as usize }>::run(tree, globals, wo, layering, curves, layers),
-    })
+    let zero = V3::new(S::zero(), S::zero(), S::zero());
+    let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
+    // Written in place: a BSDF with room for eight lobes is too large to pass around.
+    let mut bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
+    match layers {
+        0..=4 => Flattener::<S, 4>::new(tree, globals, curves, &mut bsdf).walk(),
+        _ => Flattener::<S, { MAX_LAYERS as usize }>::new(tree, globals, curves, &mut bsdf).walk(),
+    }
+    bsdf.finish();
+    Ok(bsdf)
 }
 
-struct Flattener<'t, 'm, S: Scalar, const D: usize> {
+struct Flattener<'t, 'b, 'm, S: Scalar, const D: usize> {
     tree: &'t ClosureTree,
     globals: &'t Globals,
     curves: &'m Curves<S>,
-    bsdf: Bsdf<'m, S>,
+    bsdf: &'b mut Bsdf<'m, S>,
     /// The walk for ωo, made while flattening.
     stack: LayerStack<S, D>,
     /// Normal and tangent as the tree gave them, per frame.
-    frame_keys: SmallVec<[(Vec3, Vec3); 2]>,
+    frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
 }
 
-impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
-    fn run(
-        tree: &'t ClosureTree,
-        globals: &'t Globals,
-        wo: V3<S>,
-        layering: Layering,
-        curves: &'m Curves<S>,
-        layers: u16,
-    ) -> Bsdf<'m, S> {
-        let zero = V3::new(S::zero(), S::zero(), S::zero());
-        let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
-        let bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
-        let mut flattener =
-            Self { tree, globals, curves, bsdf, stack: LayerStack::default(), frame_keys: SmallVec::new() };
-        flattener.walk();
-        flattener.bsdf.finish();
-        flattener.bsdf
+impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
+    fn new(tree: &'t ClosureTree, globals: &'t Globals, curves: &'m Curves<S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
+        Flattener { tree, globals, curves, bsdf, stack: LayerStack::default(), frame_keys: SmallVec::new() }
     }
 
     fn walk(&mut self) {
         let one = [S::one(); 3];
-        let mut steps: SmallVec<[Step<S>; 16]> = SmallVec::new();
+        let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
         steps.push(Step::Visit(self.tree.root(), Weights { total: one, in_top: one, inside: false }));
         while let Some(step) = steps.pop() {
             match step {
@@ -162,9 +156,8 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
                 Step::Middle(w) => {
                     let Layering { rule, tint } = self.bsdf.layering;
                     let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
-                    let layer = self.bsdf.layers.len() as u32;
                     self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
-                    self.bsdf.ops.push(Op::Middle(layer));
+                    self.bsdf.ops.push(Op::Middle);
                 }
                 Step::End => {
                     self.stack.end();
@@ -198,7 +191,6 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
             LayeringRule::View => self.stack.lobe(w.in_top, albedo),
             LayeringRule::Min => self.stack.lobe(w.in_top, lobe.albedo_bound(wo, curve)),
         }
-        let index = self.bsdf.lobes.len() as u32;
         self.bsdf.lobes.push(FlatLobe {
             lobe,
             curve,
@@ -213,7 +205,7 @@ impl<'t, 'm, S: Scalar, const D: usize> Flattener<'t, 'm, S, D> {
             albedo: share,
             probability: S::zero(),
         });
-        self.bsdf.ops.push(Op::Lobe(index));
+        self.bsdf.ops.push(Op::Lobe);
     }
 
     /// The frame of a lobe: its own normal and tangent, or the shading point's.

@@ -27,10 +27,22 @@ pub enum Node {
     /// A closure scaled per channel; the weight lies in [0, 1e30].
     Mul(Rgb32, NodeId),
     /// `top` over `base`.
-    Layer { top: NodeId, base: NodeId },
+    Layer {
+        /// What light meets first.
+        top: NodeId,
+        /// What it scales.
+        base: NodeId,
+    },
     /// A lobe. `site` tells which place in the program made it (its albedo curve is kept per site); the parameter
-    /// values start at `slots` in [`ClosureTree::slots`].
-    Lobe { kind: LobeKind, site: u32, slots: u32 },
+    /// values are [`ClosureTree::values`] from `slots` on.
+    Lobe {
+        /// Which lobe.
+        kind: LobeKind,
+        /// The place that made it.
+        site: u32,
+        /// Where its values start.
+        slots: u32,
+    },
 }
 
 /// The largest weight a node may carry; anything above is clamped to it.
@@ -39,8 +51,8 @@ pub const MAX_WEIGHT: f32 = 1e30;
 /// Closures as a shader composes them. Build with the methods below; the last call is to [`set_root`](Self::set_root).
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
-    nodes: SmallVec<[Node; 20]>,
-    sizes: SmallVec<[Size; 20]>,
+    nodes: SmallVec<[Node; 40]>,
+    sizes: SmallVec<[Size; 40]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
 }
@@ -174,14 +186,17 @@ impl ClosureTree {
         self.push(Node::Lobe { kind, site, slots })
     }
 
+    /// Makes `root` the closure the tree stands for.
     pub fn set_root(&mut self, root: NodeId) {
         self.root = root;
     }
 
+    /// The closure the tree stands for.
     pub fn root(&self) -> NodeId {
         self.root
     }
 
+    /// What a node is.
     pub fn node(&self, id: NodeId) -> Node {
         self.nodes[id.index()]
     }

@@ -148,9 +148,9 @@ impl Program {
     /// The tree is larger than a budget allows; it is then black.
     pub fn shade(&self, globals: &Globals, tree: &mut ClosureTree) -> Result<(), ShadeError> {
         tree.clear();
-        let mut cells: SmallVec<[u32; 96]> = SmallVec::from_slice(&self.image);
+        let mut cells: SmallVec<[u32; 160]> = SmallVec::from_slice(&self.image);
         cells.resize(self.registers, 0);
-        let mut closures: SmallVec<[NodeId; 16]> = SmallVec::from_elem(tree.zero(), self.closures);
+        let mut closures: SmallVec<[NodeId; 32]> = SmallVec::from_elem(tree.zero(), self.closures);
         let mut at = 0;
         while let Some(instr) = self.code.get(at) {
             at += 1;

@@ -177,6 +177,14 @@ impl CheckedShader {
         Ok(lower::lower(&body, &needs, warnings))
     }
 
+    /// The program with every parameter left open: read from memory at every point instead of folded away. What
+    /// specialising saves is the difference to it.
+    pub fn unspecialised(&self) -> Program {
+        let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
+        let body = dead::remove(fold::fold_open(&self.body, &open));
+        lower::lower(&body, &needs::needs(&body), Vec::new())
+    }
+
     fn unknown_parameter(&self, name: &str) -> Diagnostic {
         let d = Diagnostic::error("E0401", self.span, format!("`{}` has no parameter `{name}`", self.name));
         let names = || self.params.iter().map(|p| p.name.as_str());

@@ -36,14 +36,18 @@ pub fn fresnel<L: Real>(m: L, c: L) -> L {
 /// A direction in the coordinates of a thread.
 #[derive(Clone, Copy, Debug)]
 pub struct Around<R> {
+    /// sin θ.
     pub sin: R,
+    /// cos θ.
     pub cos: R,
-    /// The unit vector (y, z)/cos θ; its second part is cos φ.
+    /// The unit vector (y, z)/cos θ: sin φ.
     pub py: R,
+    /// See `py`; cos φ.
     pub pz: R,
 }
 
 impl<R: Real> Around<R> {
+    /// Of a unit vector in the thread's frame.
     #[inline(always)]
     pub fn new(w: V3<R>) -> Self {
         let cos = w.y.mul_add(w.y, w.z * w.z).sqrt();
@@ -51,6 +55,7 @@ impl<R: Real> Around<R> {
         Around { sin: w.x, cos, py: w.y * inv, pz: w.z * inv }
     }
 
+    /// The same in another type.
     #[inline(always)]
     pub fn lift<S: Real>(o: Around<S>) -> Self
     where
@@ -75,6 +80,7 @@ impl<R: Real> Around<R> {
 /// The surface reflection and the two parts of the volume term, before A and kd.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<R> {
+    /// The surface reflection.
     pub surface: R,
     /// The g(γv) part.
     pub forward: R,
@@ -152,6 +158,27 @@ pub fn total_reflectance(width: f64, theta: f64) -> f64 {
         size * rule.nodes.iter().zip(&rule.weights).map(|(u, w)| w * value(ends[0] + size * u)).sum::<f64>()
     };
     edges.windows(2).map(cell).sum()
+}
+
+/// The way of a ray after it is refracted into a smooth dielectric cylinder of index `eta` about the x axis and out
+/// again: `way` is its unit direction, `offset` in (−1, 1) how far from the axis it passes, in radii. `None` where it is
+/// reflected inside. The component along the axis stays what it was (Marschner et al. 2003).
+pub fn through_smooth_cylinder(way: [f64; 3], offset: f64, eta: f64) -> Option<[f64; 3]> {
+    let refract = |d: [f64; 3], n: [f64; 3], eta: f64| {
+        let c = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]);
+        let k = 1.0 - eta * eta * (1.0 - c * c);
+        (k > 0.0).then(|| std::array::from_fn::<f64, 3, _>(|i| eta * d[i] + (eta * c - k.sqrt()) * n[i]))
+    };
+    // Where it meets the unit circle across the axis.
+    let flat = way[1].hypot(way[2]).max(f64::MIN_POSITIVE);
+    let u = [way[1] / flat, way[2] / flat];
+    let back = (1.0 - offset * offset).max(0.0).sqrt();
+    let n = [0.0, -offset * u[1] - back * u[0], offset * u[0] - back * u[1]];
+    let inside = refract(way, n, 1.0 / eta)?;
+    let flat2 = inside[1] * inside[1] + inside[2] * inside[2];
+    let chord = -2.0 * (n[1] * inside[1] + n[2] * inside[2]) / flat2;
+    let out = [0.0, -(n[1] + chord * inside[1]), -(n[2] + chord * inside[2])];
+    refract(inside, out, eta)
 }
 
 /// A proposal for θi: the logistic distribution about a ridge, cut off at ±π/2. Its tails are heavier than a

@@ -22,6 +22,7 @@ pub struct Emission<S> {
 }
 
 impl<S: Real> Emission<S> {
+    /// Radiance toward ωo.
     pub fn radiance(&self) -> S {
         self.radiance
     }

@@ -4,19 +4,25 @@
 //! Out: f, pdf, samples, albedo and – required – a bound on the albedo. A lobe never sees other lobes, weights,
 //! layers or world space.
 
+pub mod charlie;
+pub mod ltc;
 pub mod registry;
 
+mod charlie_terms;
 mod cloth;
 pub mod cylinder;
-mod diffuse;
-mod emission;
+pub mod diffuse;
+pub mod emission;
+pub mod eon;
 pub mod fabric;
-mod microcylinder;
-mod oren_nayar;
-mod sheen;
-mod thread;
-mod translucent;
-mod transparent;
+mod ltc_tables;
+pub mod microcylinder;
+pub mod oren_nayar;
+pub mod sheen;
+pub mod thread;
+pub mod translucent;
+pub mod transparent;
+pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -32,6 +38,7 @@ pub type Rgb32 = [f32; 3];
 /// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
 /// type parameter is what the lobe was prepared in; `f`, `pdf` and `albedo_bound` may be evaluated over lanes.
 pub trait Lobe<S: Real>: Sized + Copy {
+    /// The declared parameters.
     type Params: ClosureParams;
 
     /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
@@ -86,7 +93,7 @@ macro_rules! lobes {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u16)]
-        pub enum LobeKind { $( $Lobe ),* }
+        pub enum LobeKind { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe ),* }
 
         impl LobeKind {
             /// Every lobe there is.
@@ -126,7 +133,7 @@ macro_rules! lobes {
 
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
-        pub enum AnyLobe<S: Real> { $( $Lobe($module::$Lobe<S>) ),* }
+        pub enum AnyLobe<S: Real> { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>) ),* }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
@@ -178,9 +185,12 @@ lobes! {
     sheen::Sheen,
     thread::Thread,
     microcylinder::Microcylinder,
+    velvet::Velvet,
+    eon::Eon,
 }
 
 impl LobeKind {
+    /// Whether the lobe scatters, transmits in one direction, or emits.
     pub fn class(self) -> LobeClass {
         self.spec().class
     }

@@ -1,6 +1,6 @@
 //! What a closure is called, what it takes, and what it becomes: the declarations every other part reads.
 //!
-//! A lobe states its parameters once, with [`closure!`](crate::lobes::registry::closure); the language takes the
+//! A lobe states its parameters once, with the `closure!` macro; the language takes the
 //! signature from it, `overcoat lobes` the documentation, [`crate::closure`] the layout of the values, the laws in
 //! `tests/` the ranges to try. A [`Form`] is one way to call a closure from a script: a lobe's own signature, or an
 //! alias or wrapper that expands to it.
@@ -10,10 +10,15 @@ use super::LobeKind;
 /// The type of a closure parameter, as a script writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParamTy {
+    /// One number.
     Float,
+    /// A whole number.
     Int,
+    /// Linear RGB.
     Color,
+    /// A direction, not necessarily unit.
     Vector,
+    /// A surface normal, not necessarily unit.
     Normal,
     /// One of [`ParamSpec::options`]; stored as its index.
     String,
@@ -48,7 +53,9 @@ impl ParamTy {
 /// One declared parameter of a closure.
 #[derive(Clone, Copy, Debug)]
 pub struct ParamSpec {
+    /// As scripts write it.
     pub name: &'static str,
+    /// Its type.
     pub ty: ParamTy,
     /// Given as `"name", value` after the positional arguments, and then optional.
     pub keyword: bool,
@@ -57,9 +64,11 @@ pub struct ParamSpec {
     pub default: &'static [f32],
     /// Values are clamped to this range, per channel, when a lobe is built. Infinite where there is no limit.
     pub min: f32,
+    /// Lower end of the range.
     pub max: f32,
     /// The words a string parameter may be.
     pub options: &'static [&'static str],
+    /// Upper end of the range.
     pub doc: &'static str,
 }
 
@@ -78,13 +87,17 @@ impl ParamSpec {
 /// A lobe's declaration.
 #[derive(Debug)]
 pub struct LobeSpec {
+    /// As scripts call it.
     pub name: &'static str,
+    /// In declared order, keywords last.
     pub params: &'static [ParamSpec],
+    /// What it looks like and what it does.
     pub doc: &'static str,
     /// Paper and equation.
     pub source: &'static str,
     /// Whether f(ωo, ωi) = f(ωi, ωo) at the default parameters.
     pub reciprocal: bool,
+    /// How it takes part in a BSDF.
     pub class: LobeClass,
 }
 
@@ -159,9 +172,23 @@ pub enum SlotSource {
 pub enum Build {
     /// A lobe; one source per lobe parameter, in the lobe's order; none at all means the form's parameters are the
     /// lobe's.
-    Lobe { kind: LobeKind, args: &'static [SlotSource] },
+    Lobe {
+        /// Which one.
+        kind: LobeKind,
+        /// Where its values come from.
+        args: &'static [SlotSource],
+    },
     /// `layer(weight * lobe, base)`: a lobe, tinted by the color parameter `weight`, over the closure parameter `base`.
-    Wrap { kind: LobeKind, args: &'static [SlotSource], weight: usize, base: usize },
+    Wrap {
+        /// The lobe on top.
+        kind: LobeKind,
+        /// Where its values come from.
+        args: &'static [SlotSource],
+        /// Index of the color parameter that tints it.
+        weight: usize,
+        /// Index of the closure parameter below it.
+        base: usize,
+    },
     /// `layer(top, base)` of the closure parameters 0 and 1.
     Layer,
 }
@@ -169,11 +196,17 @@ pub enum Build {
 /// One callable signature.
 #[derive(Clone, Copy, Debug)]
 pub struct Form {
+    /// As scripts call it.
     pub name: &'static str,
+    /// In order, keywords last.
     pub params: &'static [ParamSpec],
+    /// What it does.
     pub doc: &'static str,
+    /// Paper and equation.
     pub source: &'static str,
+    /// Whether what it builds is reciprocal at the default parameters.
     pub reciprocal: bool,
+    /// What a call becomes.
     pub build: Build,
 }
 
@@ -190,10 +223,12 @@ impl Form {
         }
     }
 
+    /// The parameters given by position.
     pub fn positional(&self) -> impl Iterator<Item = &'static ParamSpec> {
         self.params.iter().filter(|p| !p.keyword)
     }
 
+    /// The parameters given by name.
     pub fn keywords(&self) -> impl Iterator<Item = &'static ParamSpec> {
         self.params.iter().filter(|p| p.keyword)
     }
@@ -206,8 +241,9 @@ impl Form {
     }
 }
 
-/// A parameter block read from slots: implemented by [`closure!`](crate::lobes::registry::closure).
+/// A parameter block read from slots: implemented by the `closure!` macro.
 pub trait ClosureParams: Sized + Copy {
+    /// The declaration.
     const SPEC: &'static LobeSpec;
     /// Reads the block; every value is clamped to its declared range.
     fn from_slots(slots: &[f32]) -> Self;

@@ -1,32 +1,61 @@
-//! Sheen: the cloth lobe of Conty & Kulla 2017, "Production Friendly Microfacet Sheen BRDF".
+//! Sheen: the cloth lobe of Conty & Kulla 2017, "Production Friendly Microfacet Sheen BRDF", and its relatives.
 //!
 //! f = D·G / (4·μo·μi): fibres standing along the normal, their directions spread by `roughness`. At low roughness
 //! (0.07–0.2) a thin bright rim, as on short-pile velvet; in the middle (0.3–0.5) a soft glow that reaches half-way
 //! in, as on peach skin; at 1 an almost even dusting, as on felt or chalk.
 //!
-//! Where this departs from the paper: both cosines are clamped to 1e-3 inside Λ and in the denominator and the
-//! roughness to 0.07, because the fitted Λ saturates toward grazing where the true one grows without bound, so that
-//! the raw lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E stays below 0.95 from both sides.
+//! The models share D and differ in G. Each keeps the roughness to its own range, so that a value below its floor is
+//! taken as the floor:
+//!
+//! | model | G | r from | softening | gains? |
+//! |---|---|---|---|---|
+//! | `conty_kulla` | the paper's fit of Smith's Λ (eq. 3, Table 1) | 0.07 | eq. 4 | no |
+//! | `refit` | the same rows under a better weight over r | 0.02 | eq. 4 | no |
+//! | `exact` | Smith's Λ itself | 0.001 | ignored | no |
+//! | `charlie_v` | Narkowicz 2018: G/(4μoμi) = 1/(4(μo + μi − μoμi)) | 0.02 | ignored | bounded |
+//! | `zeltner` | a transformed cosine fitted to `exact`, scaled by its E | 0.05 | ignored | bounded |
+//!
+//! Where this departs from the sources: under the fits both cosines are clamped to 1e-3 inside Λ and in the
+//! denominator, because the fitted Λ saturates toward grazing where the true one grows without bound, so that the raw
+//! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.99 and that of
+//! `refit` below 0.95, from both sides. A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204,
+//! and is untouched above. `zeltner` follows Zeltner, Burley & Chiang 2022 in form only: the table is fitted to
+//! `exact`, not to a volume of fibres.
+//!
+//! The paper samples the hemisphere uniformly. Here all models are sampled by a transformed cosine mixed with a
+//! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
 
+use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
+use super::ltc::{self, Ltc};
+use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, ParamTy, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Real, V3};
 
 closure! {
-    /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. The fitted shadowing of the
-    /// paper's Table 1, its terminator softened unless told otherwise. One-sided: black below the surface.
+    /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
+    /// shadowing of Conty & Kulla, its terminator softened. One-sided: black below the surface.
     closure "sheen_bsdf" as SheenParams {
         /// Shading normal.
         normal N;
         /// Color the lobe is multiplied with.
         color albedo = [1.0, 1.0, 1.0], in (0.0, 1.0);
-        /// How far the fibres lean away from the normal (paper: r). Low: a thin rim; high: an even dusting.
-        float roughness = 0.3, in (0.07, 1.0);
-        /// 1: the shadowing toward the light is softened (eq. 4), which gives up reciprocity. 0: the raw model.
+        /// How far the fibres lean away from the normal (paper: r). Low: a thin rim; high: an even dusting. Each model
+        /// has its own floor: conty_kulla 0.07, refit and charlie_v 0.02, zeltner 0.05, exact 0.001.
+        float roughness = 0.3, in (0.001, 1.0);
+        /// 0: conty_kulla, 1: zeltner. Only looked at where no model is named. (MaterialX calls its own D·V mode 0:
+        /// that is "charlie_v" here.)
+        @keyword int mode = 0.0, in (0.0, 1.0);
+        /// How fibres shadow each other. "conty_kulla": the paper's fit; "refit": the same fit, better blended over r;
+        /// "exact": Smith's integral; "charlie_v": Narkowicz's fast visibility; "zeltner": a transformed cosine fitted
+        /// to the exact model; "auto": what `mode` says.
+        @keyword string model = 0.0, in (0.0, 5.0), of ["auto", "conty_kulla", "refit", "exact", "charlie_v", "zeltner"];
+        /// 1: the shadowing toward the light is softened (eq. 4), which gives up reciprocity. 0: the raw model. Only
+        /// conty_kulla and refit know it.
         @keyword int softening = 1.0, in (0.0, 1.0);
     }
-    source: "Conty & Kulla 2017, eq. 1-4 and Table 1",
+    source: "Conty & Kulla 2017, eq. 1-4 and Table 1; Narkowicz 2018; Zeltner, Burley & Chiang 2022",
     reciprocal: false,
     class: Scatter,
 }
@@ -47,13 +76,27 @@ const TINT: ParamSpec = ParamSpec { name: "tint", doc: "Color of the sheen.", ..
 pub(super) const FORMS: &[Form] = &[
     Form {
         name: "sheen",
-        params: &[BASE, SheenParams::SPEC.params[0], TINT, SheenParams::SPEC.params[2], SheenParams::SPEC.params[3]],
+        params: &[
+            BASE,
+            SheenParams::SPEC.params[0],
+            TINT,
+            SheenParams::SPEC.params[2],
+            SheenParams::SPEC.params[4],
+            SheenParams::SPEC.params[5],
+        ],
         doc: "Sheen layered over a closure: `layer(tint * sheen_bsdf(N, 1, roughness), base)`.",
         source: "Conty & Kulla 2017, §5",
         reciprocal: false,
         build: Build::Wrap {
             kind: LobeKind::Sheen,
-            args: &[SlotSource::Param(1), SlotSource::Const(&[1.0; 3]), SlotSource::Param(3), SlotSource::Param(4)],
+            args: &[
+                SlotSource::Param(1),
+                SlotSource::Const(&[1.0; 3]),
+                SlotSource::Param(3),
+                SlotSource::Const(&[0.0]),
+                SlotSource::Param(4),
+                SlotSource::Param(5),
+            ],
             weight: 2,
             base: 0,
         },
@@ -70,128 +113,204 @@ pub(super) const FORMS: &[Form] = &[
                 SlotSource::Param(0),
                 SlotSource::Const(&[1.0; 3]),
                 SlotSource::Param(1),
+                SlotSource::Const(&[0.0]),
+                SlotSource::Const(&[0.0]),
                 SlotSource::Const(&[1.0]),
             ],
         },
     },
 ];
 
-/// Cosines below this are taken as this inside Λ and in the denominator.
+/// Cosines below this are taken as this inside the fitted Λ and in its denominator.
 const MIN_COS: f64 = 1e-3;
 
-/// The distribution D and the fitted shadowing Λ for one roughness.
-#[derive(Clone, Copy, Debug)]
-struct Fibres<S> {
-    /// (2 + 1/r) / 2π.
-    norm: S,
-    /// 0.5 / r: the exponent of sin².
-    exponent: S,
-    /// Coefficients of L(x) = a/(1 + b·x^c) + d·x + e (eq. 3).
-    a: S,
-    b: S,
-    c: S,
-    d: S,
-    e: S,
-    /// 2·L(½).
-    twice_l_half: S,
+/// One model with its switches thrown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Variant {
+    Softened,
+    Fitted,
+    RefitSoftened,
+    Refit,
+    Exact,
+    CharlieV,
+    Zeltner,
 }
 
-impl<S: Real> Fibres<S> {
-    fn new(r: S) -> Self {
-        // Table 1: rows for r = 0 and r = 1, blended by (1 − r)².
-        const ROWS: [[f64; 2]; 5] =
-            [[25.3245, 21.5473], [3.32435, 3.82987], [0.16801, 0.19823], [-1.27393, -1.97760], [-4.85967, -4.32054]];
-        let w = (S::one() - r).sq();
-        let [a, b, c, d, e] = ROWS.map(|[p0, p1]| w * S::c(p0) + (S::one() - w) * S::c(p1));
-        let inv_r = S::one() / r;
-        let half = S::c(0.5);
-        let fibres = Fibres {
-            norm: (S::c(2.0) + inv_r) * S::c(0.5 * std::f64::consts::FRAC_1_PI),
-            exponent: half * inv_r,
-            a,
-            b,
-            c,
-            d,
-            e,
-            twice_l_half: S::zero(),
-        };
-        Fibres { twice_l_half: S::c(2.0) * fibres.l(half), ..fibres }
+use Variant::{CharlieV, Exact, Fitted, Refit, RefitSoftened, Softened, Zeltner};
+
+impl Variant {
+    const ALL: [Variant; 7] = [Softened, Fitted, RefitSoftened, Refit, Exact, CharlieV, Zeltner];
+
+    /// From the slot values of `mode`, `model` and `softening`.
+    fn of(mode: u32, model: u32, softening: u32) -> Variant {
+        let model = if model == 0 { [1, 5][mode.min(1) as usize] } else { model };
+        match (model, softening) {
+            (1, 0) => Fitted,
+            (1, _) => Softened,
+            (2, 0) => Refit,
+            (2, _) => RefitSoftened,
+            (3, _) => Exact,
+            (4, _) => CharlieV,
+            _ => Zeltner,
+        }
     }
 
-    /// L(x) of eq. 3.
-    #[inline(always)]
-    fn l<L: Real + Lift<S>>(&self, x: L) -> L {
-        let power = x.powf(L::lift(self.c));
-        L::lift(self.a) / (L::one() + L::lift(self.b) * power) + L::lift(self.d).mul_add(x, L::lift(self.e))
+    /// The smallest roughness; lower ones are taken as this.
+    fn floor(self) -> f64 {
+        match self {
+            Softened | Fitted => 0.07,
+            RefitSoftened | Refit | CharlieV => 0.02,
+            Exact => charlie::MIN_ROUGHNESS,
+            Zeltner => 0.05,
+        }
     }
 
-    /// ln Λ(μ), eq. 3.
-    #[inline(always)]
-    fn ln_lambda<L: Real + Lift<S>>(&self, cos: L) -> L {
-        let low = cos.lt(L::c(0.5));
-        let l = self.l(L::select(low, cos, L::one() - cos));
-        L::select(low, l, L::lift(self.twice_l_half) - l)
+    fn reciprocal(self) -> bool {
+        matches!(self, Fitted | Refit | Exact | CharlieV)
     }
 
-    /// D(h) of eq. 2 from s² = sin²θh.
-    #[inline(always)]
-    fn d<L: Real + Lift<S>>(&self, sin2: L) -> L {
-        L::lift(self.norm) * sin2.powf(L::lift(self.exponent))
+    /// Whether E exceeds 1 for some angle at some roughness from `roughness` up.
+    fn gains(self, roughness: f64) -> bool {
+        match self {
+            Softened | Fitted | RefitSoftened | Refit | Exact => false,
+            CharlieV => roughness < 0.205,
+            Zeltner => true,
+        }
     }
+}
+
+/// How fibres hide each other, prepared for ωo.
+#[derive(Clone, Copy, Debug)]
+enum Shadowing<S> {
+    /// 1 + Λ(ωo); 1/(4·μo); 2 with softening and 0 without.
+    Fitted {
+        fit: FittedLambda<S>,
+        lambda_o: S,
+        scale: S,
+        soften: S,
+    },
+    /// μo·Λ(ωo).
+    Exact {
+        exact: ExactLambda<S>,
+        cos_lambda_o: S,
+    },
+    Visibility,
+    /// The albedo the transformed cosine is scaled by.
+    Transformed {
+        albedo: S,
+    },
 }
 
 /// See [`SheenParams`].
 #[derive(Clone, Copy, Debug)]
 pub struct Sheen<S> {
     fibres: Fibres<S>,
-    /// The roughness, where a table over it has to be read.
+    /// Where a table over the roughness has to be read.
     roughness: S,
     wo: V3<S>,
-    /// 1 + Λ(ωo).
-    lambda_o: S,
-    /// 1/(4·μo) on the normal's side, else 0: f is 0 there.
-    scale: S,
-    /// 2 with softening, 0 without.
-    soften: S,
+    shadowing: Shadowing<S>,
+    /// What is sampled; under `zeltner` also the lobe.
+    ltc: Ltc<S>,
+    /// The curve's excess at ωo.
+    excess: S,
 }
 
 impl<S: Real> Sheen<S> {
-    fn prepare(roughness: S, softening: bool, wo: V3<S>) -> Self {
-        let fibres = Fibres::new(roughness);
-        let cos = wo.z.clamp(S::c(MIN_COS), S::one());
-        Sheen {
-            fibres,
-            roughness,
-            wo,
-            lambda_o: S::one() + fibres.ln_lambda(cos).exp(),
-            scale: S::select(wo.z.gt(S::zero()), S::c(0.25) / cos, S::zero()),
-            soften: S::c(if softening { 2.0 } else { 0.0 }),
-        }
+    fn prepare(variant: Variant, roughness: S, wo: V3<S>, terms: &[S]) -> Self {
+        let r = roughness.clamp(S::c(variant.floor()), S::one());
+        let mut ltc =
+            Ltc::proposal(if variant == Softened || variant == RefitSoftened { &SOFTENED } else { &SHEEN }, wo, r);
+        let fitted = |fit: FittedLambda<S>, soften: f64| {
+            let cos = wo.z.clamp(S::c(MIN_COS), S::one());
+            let lambda_o = S::one() + fit.ln_lambda(cos).exp();
+            Shadowing::Fitted { fit, lambda_o, scale: S::c(0.25) / cos, soften: S::c(soften) }
+        };
+        let shadowing = match variant {
+            Softened => fitted(FittedLambda::published(r), 2.0),
+            Fitted => fitted(FittedLambda::published(r), 0.0),
+            RefitSoftened => fitted(FittedLambda::refitted(r), 2.0),
+            Refit => fitted(FittedLambda::refitted(r), 0.0),
+            Exact => {
+                let exact = ExactLambda::new(r);
+                Shadowing::Exact { exact, cos_lambda_o: exact.cos_lambda(unit_cosine(wo), sin2(wo), terms) }
+            }
+            CharlieV => Shadowing::Visibility,
+            Zeltner => {
+                let [a, b, c, albedo] = ltc::read(&ZELTNER, wo.z, r);
+                ltc = Ltc::new([a, b, c, S::zero()], wo);
+                Shadowing::Transformed { albedo }
+            }
+        };
+        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }
     }
 
-    /// f(ωo, ωi), eq. 1 with F = 1.
+    /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        let cos = wi.z.clamp(L::c(MIN_COS), L::one());
-        // sin² of the half vector as hx² + hy²: 1 − cos² would lose everything near the normal.
-        let h = V3::lift(self.wo) + wi;
-        let across = h.x.mul_add(h.x, h.y * h.y);
-        let sin2 = (across / (across + h.z * h.z).max(L::c(1e-30))).clamp(L::zero(), L::one());
-        // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
-        let grazing = (L::one() - cos).sq().sq().sq();
-        let softened = L::lift(self.soften).mul_add(grazing, L::one());
-        let lambda_i = (self.fibres.ln_lambda(cos) * softened).exp();
-        let f = self.fibres.d(sin2) * L::lift(self.scale) / (cos * (L::lift(self.lambda_o) + lambda_i));
-        L::select(wi.z.gt(L::zero()), f, L::zero())
+    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
+        let wo = V3::<L>::lift(self.wo);
+        let d = self.fibres.d(charlie::half_cot2(wo, wi));
+        let f = match self.shadowing {
+            Shadowing::Fitted { fit, lambda_o, scale, soften } => {
+                let cos = wi.z.clamp(L::c(MIN_COS), L::one());
+                // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
+                let grazing = (L::one() - cos).sq().sq().sq();
+                let softened = L::lift(soften).mul_add(grazing, L::one());
+                let lambda_i = (fit.ln_lambda(cos) * softened).exp();
+                d * L::lift(scale) / (cos * (L::lift(lambda_o) + lambda_i))
+            }
+            Shadowing::Exact { exact, cos_lambda_o } => {
+                // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
+                let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
+                let sum = wo.z * (wi.z + cos_lambda_i) + wi.z * L::lift(cos_lambda_o);
+                d * L::c(0.25) / sum.max(L::c(1e-30))
+            }
+            Shadowing::Visibility => d * visibility(wo.z, wi.z),
+            Shadowing::Transformed { albedo } => L::lift(albedo) * self.ltc.density_over_cos(wi),
+        };
+        L::select(wo.z.gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
     }
 
-    /// What [`CurveSpec`] integrates: key = [roughness, softening].
+    /// What [`CurveSpec`] integrates: key = [roughness, variants], the largest f of the variants whose bit is set.
     fn kernel(key: &[f64; 4], wo: V3<f64>, wi: &[V3<f64>], out: &mut [f64]) {
-        let lobe = Sheen::<f64>::prepare(key[0], key[1] > 0.5, wo);
-        for (out, wi) in out.iter_mut().zip(wi) {
-            *out = lobe.value(*wi);
+        out.fill(0.0);
+        let terms = charlie::terms_at(key[0].clamp(charlie::MIN_ROUGHNESS, 1.0));
+        for variant in Variant::ALL {
+            if key[1] as u32 & 1 << variant as u32 != 0 {
+                let lobe = Sheen::<f64>::prepare(variant, key[0], wo, &terms);
+                for (out, wi) in out.iter_mut().zip(wi) {
+                    *out = out.max(lobe.value(*wi, &terms));
+                }
+            }
         }
     }
+
+    /// For [`CurveSpec::extra`]: the coefficients of the exact Λ, where it may be asked for.
+    fn extra(key: &[f64; 4], axis: Option<Axis>) -> Vec<f64> {
+        if key[1] as u32 & 1 << Exact as u32 == 0 {
+            vec![]
+        } else if axis.is_some() {
+            charlie::term_rows()
+        } else {
+            charlie::terms_at(key[0]).to_vec()
+        }
+    }
+}
+
+/// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
+#[inline(always)]
+pub(super) fn visibility<L: Real>(cos_o: L, cos_i: L) -> L {
+    L::c(0.25) / (cos_o + cos_i - cos_o * cos_i).max(L::c(1e-30))
+}
+
+#[inline(always)]
+fn unit_cosine<L: Real>(w: V3<L>) -> L {
+    w.z.clamp(L::zero(), L::one())
+}
+
+/// sin²θ without cancellation near the normal.
+#[inline(always)]
+fn sin2<L: Real>(w: V3<L>) -> L {
+    w.x.mul_add(w.x, w.y * w.y)
 }
 
 impl<S: Real> Lobe<S> for Sheen<S> {
@@ -199,15 +318,30 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let spec = SheenParams::SPEC;
-        let (rough, soft) = (&spec.params[2], &spec.params[3]);
-        let value = |p: &ParamSpec| values[spec.slot_of(p.name).unwrap_or(0)].map(|v| p.clamp(0, v) as f64);
-        let softening = value(soft);
+        let value = |name: &str| {
+            let p = spec.params.iter().find(|p| p.name == name)?;
+            values[spec.slot_of(name)?].map(|v| p.clamp(0, v))
+        };
+        let choices = |name: &str, count: u32| match value(name) {
+            Some(v) => v as u32..v as u32 + 1,
+            None => 0..count,
+        };
+        let mut variants = Vec::new();
+        for mode in choices("mode", 2) {
+            for model in choices("model", 6) {
+                variants.extend(choices("softening", 2).map(|softening| Variant::of(mode, model, softening)));
+            }
+        }
+        let lo = variants.iter().map(|v| v.floor()).fold(1.0, f64::min);
+        let roughness = value("roughness").map(|r| (r as f64).max(lo));
+        let mask = variants.iter().fold(0, |mask, v| mask | 1u32 << *v as u32);
         Some(CurveSpec {
             kernel: Sheen::<f64>::kernel,
-            key: [value(rough).unwrap_or(0.0), softening.unwrap_or(1.0), 0.0, 0.0],
-            axis: value(rough).is_none().then_some(Axis { index: 0, lo: rough.min as f64, hi: rough.max as f64 }),
-            reciprocal: softening == Some(0.0),
-            bounded: false,
+            key: [roughness.unwrap_or(0.0), mask as f64, 0.0, 0.0],
+            axis: roughness.is_none().then_some(Axis { index: 0, lo, hi: 1.0 }),
+            reciprocal: variants.iter().all(|v| v.reciprocal()),
+            bounded: mask.count_ones() > 1 || variants.iter().any(|v| v.gains(roughness.unwrap_or(lo))),
+            extra: Sheen::<f64>::extra,
         })
     }
 
@@ -216,25 +350,28 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     fn reciprocal(params: &SheenParams) -> bool {
-        params.softening == 0
+        Variant::of(params.mode, params.model, params.softening).reciprocal()
     }
 
-    fn new(params: &SheenParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
-        Sheen::prepare(S::from_f32(params.roughness), params.softening > 0, wo)
+    fn new(params: &SheenParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        let variant = Variant::of(params.mode, params.model, params.softening);
+        let lobe = Sheen::prepare(variant, S::from_f32(params.roughness), wo, curve.extra());
+        Sheen { excess: curve.excess(wo, lobe.roughness), ..lobe }
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
-        [self.value(wi); 3]
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
+        [self.value(wi, curve.extra()) / excess; 3]
     }
 
+    #[inline(always)]
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        sampling::uniform_hemisphere_pdf(wi.z)
+        self.ltc.pdf(wi)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
-        // The paper's choice: micronormal sampling gives large weights and directions below the surface.
-        sampling::uniform_hemisphere(u)
+        self.ltc.sample(u)
     }
 
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
@@ -243,6 +380,9 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        [curve.bound(w, L::lift(self.roughness)); 3]
+        let bound = curve.bound(w, L::lift(self.roughness));
+        // E_light integrates over the kinks of the fitted table, which the baking resolves to 1e-4 only.
+        let slack = if matches!(self.shadowing, Shadowing::Transformed { .. }) { 2e-4 } else { 0.0 };
+        [L::select(w.z.gt(L::zero()), (bound + L::c(slack)).min(L::one().max(bound)), bound); 3]
     }
 }

@@ -5,8 +5,11 @@ use super::{Lift, Real, Scalar, V3};
 /// An orthonormal frame: `t` and `b` span the surface, `n` is the normal, t × b = n.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame<S> {
+    /// The x axis, in the surface.
     pub t: V3<S>,
+    /// The y axis, in the surface.
     pub b: V3<S>,
+    /// The z axis: the normal.
     pub n: V3<S>,
 }
 

@@ -50,6 +50,10 @@ macro_rules! shared_scalar {
         fn select(mask: bool, a: Self, b: Self) -> Self {
             if mask { a } else { b }
         }
+        #[inline(always)]
+        fn pick(table: &[f32], index: Self) -> Self {
+            table[index as usize] as $t
+        }
     };
 }
 
@@ -128,6 +132,7 @@ pub struct F32x8(pub [f32; 8]);
 pub struct Mask8(pub [bool; 8]);
 
 impl F32x8 {
+    /// How many there are.
     pub const LANES: usize = 8;
 
     #[inline(always)]
@@ -271,6 +276,10 @@ impl Real for F32x8 {
     #[inline(always)]
     fn select(mask: Mask8, a: Self, b: Self) -> Self {
         F32x8(std::array::from_fn(|i| if mask.0[i] { a.0[i] } else { b.0[i] }))
+    }
+    #[inline(always)]
+    fn pick(table: &[f32], index: Self) -> Self {
+        index.map(|i| table[i as usize])
     }
 }
 

@@ -37,10 +37,13 @@ pub trait Real:
     fn min(self, o: Self) -> Self;
     /// The larger of the two; the other one if one is NaN.
     fn max(self, o: Self) -> Self;
+    /// The value without its sign.
     fn abs(self) -> Self;
     /// `self` with the sign of `s`.
     fn copysign(self, s: Self) -> Self;
+    /// Square root; NaN of a negative number.
     fn sqrt(self) -> Self;
+    /// The next whole number below.
     fn floor(self) -> Self;
     /// `self·a + b`, fused where the machine fuses.
     fn mul_add(self, a: Self, b: Self) -> Self;
@@ -53,11 +56,15 @@ pub trait Real:
     /// The angle of (x, y), in [−π, π]; 0 at the origin.
     fn atan2(self, x: Self) -> Self;
 
+    /// self < o.
     fn lt(self, o: Self) -> Self::Mask;
+    /// self ≤ o.
     fn le(self, o: Self) -> Self::Mask;
+    /// self > o.
     fn gt(self, o: Self) -> Self::Mask {
         o.lt(self)
     }
+    /// self ≥ o.
     fn ge(self, o: Self) -> Self::Mask {
         o.le(self)
     }
@@ -68,6 +75,15 @@ pub trait Real:
     fn powf(self, y: Self) -> Self {
         (y * self.ln()).exp()
     }
+    /// ln(1 + x) for x ≥ 0, precise for small x too.
+    fn ln_1p(self) -> Self {
+        // Kahan: the rounding of 1 + x is divided out again.
+        let u = Self::one() + self;
+        let d = u - Self::one();
+        Self::select(d.gt(Self::zero()), u.ln() * (self / d), self)
+    }
+    /// `table[index]` of a committed table; `index` holds whole numbers inside it.
+    fn pick(table: &[f32], index: Self) -> Self;
     /// x² .
     fn sq(self) -> Self {
         self * self
@@ -80,9 +96,11 @@ pub trait Real:
     fn safe_sqrt(self) -> Self {
         self.max(Self::c(0.0)).sqrt()
     }
+    /// 0.
     fn zero() -> Self {
         Self::c(0.0)
     }
+    /// 1.
     fn one() -> Self {
         Self::c(1.0)
     }
@@ -90,15 +108,19 @@ pub trait Real:
 
 /// One number type for a single value, as opposed to lanes: what a BSDF is built in.
 pub trait Scalar: Real<Mask = bool> + PartialOrd + Default {
+    /// In double precision.
     fn to_f64(self) -> f64;
+    /// In single precision.
     fn to_f32(self) -> f32 {
         self.to_f64() as f32
     }
+    /// Neither NaN nor infinite.
     fn is_finite(self) -> bool;
 }
 
 /// Brings what a lobe stores into the type a formula is evaluated in: a lobe prepared in `f32` evaluates over lanes.
 pub trait Lift<S>: Sized {
+    /// The same value in every lane.
     fn lift(s: S) -> Self;
     /// `table[index]` per lane; `index` holds whole numbers inside the table.
     fn gather(table: &[S], index: Self) -> Self;

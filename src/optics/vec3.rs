@@ -6,12 +6,16 @@ use core::ops::{Add, Mul, Neg, Sub};
 /// Three numbers: a direction, usually in a lobe's local frame with z along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct V3<R> {
+    /// Along the tangent.
     pub x: R,
+    /// Along the bitangent.
     pub y: R,
+    /// Along the normal.
     pub z: R,
 }
 
 impl<T> V3<T> {
+    /// The vector (x, y, z).
     #[inline(always)]
     pub fn new(x: T, y: T, z: T) -> Self {
         V3 { x, y, z }
@@ -34,6 +38,7 @@ impl<R: Real> V3<R> {
         V3::new(R::lift(v.x), R::lift(v.y), R::lift(v.z))
     }
 
+    /// From script values.
     pub fn from_f32(v: [f32; 3]) -> Self {
         V3::new(R::from_f32(v[0]), R::from_f32(v[1]), R::from_f32(v[2]))
     }
@@ -46,21 +51,25 @@ impl<R: Real> V3<R> {
         V3::new(sin * c, sin * s, cos)
     }
 
+    /// x·x′ + y·y′ + z·z′.
     #[inline(always)]
     pub fn dot(self, o: Self) -> R {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z * o.z))
     }
 
+    /// The vector product.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         V3::new(self.y * o.z - self.z * o.y, self.z * o.x - self.x * o.z, self.x * o.y - self.y * o.x)
     }
 
+    /// Its squared length.
     #[inline(always)]
     pub fn length_squared(self) -> R {
         self.dot(self)
     }
 
+    /// Each component times `s`.
     #[inline(always)]
     pub fn scale(self, s: R) -> Self {
         V3::new(self.x * s, self.y * s, self.z * s)

@@ -13,9 +13,9 @@ use glam::{Vec2, Vec3, vec2, vec3};
 pub const RESOLUTION: usize = 288;
 
 /// Length of the cloth's side, in world units.
-const SIDE: f32 = 3.2;
+const SIDE: f32 = 2.95;
 const BALL: Vec3 = vec3(0.0, 1.08, 0.0);
-const BALL_RADIUS: f32 = 0.48;
+const BALL_RADIUS: f32 = 0.5;
 /// The lowest the cloth may come: half its thickness above the floor.
 const FLOOR: f32 = 0.012;
 /// Segments per side of the nets that fall, and how many steps each is given.

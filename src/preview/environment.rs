@@ -69,9 +69,17 @@ impl Environment {
 
     /// Radiance arriving from direction `dir` (unit, toward the light).
     pub fn radiance(&self, dir: Vec3) -> Vec3 {
+        self.look(dir).0
+    }
+
+    /// [`radiance`](Self::radiance) and [`pdf`](Self::pdf) at once.
+    pub fn look(&self, dir: Vec3) -> (Vec3, f32) {
         match &self.kind {
-            Kind::Uniform(radiance) => Vec3::splat(*radiance),
-            Kind::Picture(picture) => picture.lookup(to_square(dir)),
+            Kind::Uniform(radiance) => (Vec3::splat(*radiance), 0.0),
+            Kind::Picture(picture) => {
+                let at = to_square(dir);
+                (picture.lookup(at), picture.pdf(at, dir.y))
+            }
         }
     }
 
@@ -85,10 +93,7 @@ impl Environment {
 
     /// Density per solid angle of [`sample`](Self::sample) drawing `dir`.
     pub fn pdf(&self, dir: Vec3) -> f32 {
-        match &self.kind {
-            Kind::Uniform(_) => 0.0,
-            Kind::Picture(picture) => picture.pdf(to_square(dir), dir.y),
-        }
+        self.look(dir).1
     }
 }
 
@@ -113,6 +118,8 @@ struct Picture {
     columns: Vec<f32>,
     /// `height` + 1 values rising from 0 to 1.
     rows: Vec<f32>,
+    /// cos θ at the upper edge of each row, and at the last one's lower edge.
+    cosines: Vec<f32>,
     /// Nothing in it shines.
     black: bool,
 }
@@ -123,6 +130,8 @@ impl Picture {
         for p in &mut pixels {
             *p = Vec3::from_array(p.to_array().map(sane));
         }
+        let edge = |y: usize| (y as f64 / height as f64 * std::f64::consts::PI).cos() as f32;
+        let cosines: Vec<f32> = (0..=height).map(edge).collect();
         let mut columns = Vec::with_capacity((width + 1) * height);
         let mut weights = Vec::with_capacity(height);
         let mut row = vec![0.0f64; width];
@@ -130,24 +139,23 @@ impl Picture {
             for (x, w) in row.iter_mut().enumerate() {
                 *w = blurred_luminance(&pixels, width, height, x, y);
             }
-            // The solid angle of a pixel in this row, up to a constant.
-            let (top, bottom) = (y as f64 / height as f64, (y + 1) as f64 / height as f64);
-            let solid = (top * std::f64::consts::PI).cos() - (bottom * std::f64::consts::PI).cos();
+            // Times the solid angle of a pixel in this row, up to a constant.
             let sum = cumulate(&row, &mut columns);
-            weights.push(sum * solid);
+            weights.push(sum * f64::from(cosines[y] - cosines[y + 1]));
         }
         let mut rows = Vec::with_capacity(height + 1);
         let total = cumulate(&weights, &mut rows);
-        Picture { width, height, pixels, columns, rows, black: total <= 0.0 }
+        Picture { width, height, pixels, columns, rows, cosines, black: total <= 0.0 }
     }
 
     /// Bilinear between pixel centres; around in longitude, held at the poles.
     fn lookup(&self, at: Vec2) -> Vec3 {
-        let x = at.x * self.width as f32 - 0.5;
+        // A whole turn is added to keep the column positive, so that a cast rounds down.
+        let x = at.x.clamp(0.0, 1.0) * self.width as f32 + (self.width as f32 - 0.5);
         let y = (at.y * self.height as f32 - 0.5).clamp(0.0, (self.height - 1) as f32);
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let x0 = (x.floor() as i64).rem_euclid(self.width as i64) as usize;
-        let x1 = (x0 + 1) % self.width;
+        let (fx, fy) = (x - (x as usize) as f32, y - (y as usize) as f32);
+        let x0 = x as usize % self.width;
+        let x1 = if x0 + 1 == self.width { 0 } else { x0 + 1 };
         let y0 = y as usize;
         let y1 = (y0 + 1).min(self.height - 1);
         let row = |y: usize| {
@@ -165,7 +173,7 @@ impl Picture {
         let row = &self.columns[y * (self.width + 1)..(y + 1) * (self.width + 1)];
         let (x, fx) = draw(row, u[0]);
         // Uniform in solid angle within the pixel's row: linear in cos θ.
-        let (top, bottom) = self.row_cosines(y);
+        let (top, bottom) = (self.cosines[y], self.cosines[y + 1]);
         let cos = top + (bottom - top) * fy;
         let square = vec2((x as f32 + fx) / self.width as f32, cos.clamp(-1.0, 1.0).acos() / PI);
         let (dir, _) = from_square(square);
@@ -180,10 +188,10 @@ impl Picture {
         let x = ((at.x * self.width as f32) as usize).min(self.width - 1);
         let mut y = ((at.y * self.height as f32) as usize).min(self.height - 1);
         // acos rounds; the row is where the cosine lies.
-        while y > 0 && cos > self.row_cosines(y).0 {
+        while y > 0 && cos > self.cosines[y] {
             y -= 1;
         }
-        while y + 1 < self.height && cos < self.row_cosines(y).1 {
+        while y + 1 < self.height && cos < self.cosines[y + 1] {
             y += 1;
         }
         self.cell_pdf(x, y)
@@ -193,14 +201,8 @@ impl Picture {
     fn cell_pdf(&self, x: usize, y: usize) -> f32 {
         let row = &self.columns[y * (self.width + 1)..];
         let probability = (self.rows[y + 1] - self.rows[y]) * (row[x + 1] - row[x]);
-        let (top, bottom) = self.row_cosines(y);
+        let (top, bottom) = (self.cosines[y], self.cosines[y + 1]);
         probability * self.width as f32 / (TAU * (top - bottom))
-    }
-
-    /// cos θ of a row's upper and lower edge.
-    fn row_cosines(&self, y: usize) -> (f32, f32) {
-        let edge = |y: usize| (y as f64 / self.height as f64 * std::f64::consts::PI).cos() as f32;
-        (edge(y), edge(y + 1))
     }
 }
 

@@ -22,10 +22,12 @@ impl Image {
         (data.len() == 3 * width as usize * height as usize).then_some(Image { width, height, data })
     }
 
+    /// Pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
+    /// Pixels.
     pub fn height(&self) -> u32 {
         self.height
     }

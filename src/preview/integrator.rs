@@ -1,21 +1,22 @@
 //! Paths: from a camera ray to the radiance it brings home.
 //!
 //! Unidirectional path tracing. At every scattering the environment is sampled, and so is the BSDF; the two are weighted by
-//! the power heuristic (Veach 1997), delta samples count fully. Paths end by Russian roulette or at the depth limit,
+//! the power heuristic (Veach 1997), mirror-like samples count fully. Light that passes straight through the subject
+//! (gauze) is found by both. Paths end by Russian roulette or at the depth limit,
 //! where the last ray may still escape into the light. Transmitted rays go on from the other side of the surface. No
 //! memory is allocated on the way.
 
 use super::camera::Ray;
 use super::sampler::Sampler;
 use super::scene::{EPSILON, FLOOR_ALBEDO, Hit, Point, World};
+use super::surface::goes_straight;
 use super::{RenderSettings, Scatter, Surface};
 use crate::Globals;
 use crate::closure::{Eval, Sample, SampleFlags};
 use crate::engine::ShadeError;
 use crate::lobes::Rgb32;
-use crate::optics::sampling::cosine_hemisphere;
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// How many times a path scatters before Russian roulette may end it.
 const CERTAIN: u32 = 3;
@@ -40,6 +41,7 @@ pub struct Tracer<'w, S> {
     surface: &'w S,
     max_depth: u32,
     sample_env: bool,
+    see_through: bool,
 }
 
 /// A path under way.
@@ -47,8 +49,8 @@ struct Path {
     ray: Ray,
     radiance: Vec3,
     throughput: Vec3,
-    /// Density with which the BSDF chose the ray; `None` for a camera ray or a delta sample, which no other technique
-    /// could have found.
+    /// Density with which the last BSDF that had a choice chose the direction; `None` for a camera ray and behind a
+    /// mirror, where no other technique could have found it.
     pdf: Option<f32>,
 }
 
@@ -62,7 +64,13 @@ struct Exits {
 
 impl<'w, S: Surface> Tracer<'w, S> {
     pub fn new(world: &'w World, surface: &'w S, settings: &RenderSettings) -> Self {
-        Tracer { world, surface, max_depth: settings.max_depth, sample_env: settings.sample_env }
+        Tracer {
+            world,
+            surface,
+            max_depth: settings.max_depth,
+            sample_env: settings.sample_env,
+            see_through: surface.see_through(),
+        }
     }
 
     /// Radiance arriving along `ray`, against its direction.
@@ -77,17 +85,19 @@ impl<'w, S: Surface> Tracer<'w, S> {
                     false
                 }
                 Hit::Floor { p, opacity } => {
-                    path.radiance += path.throughput * (1.0 - opacity) * self.escaped(&path);
-                    path.throughput *= opacity;
+                    if opacity < 1.0 {
+                        path.radiance += path.throughput * (1.0 - opacity) * self.escaped(&path);
+                        path.throughput *= opacity;
+                    }
                     let exits = Exits { n: Vec3::Y, near: p + Vec3::Y * EPSILON, far: p };
-                    depth < self.max_depth && self.scatter(&mut path, &Matte, &exits, depth, sampler, tally)
+                    depth < self.max_depth && self.scatter(&mut path, &Matte, &exits, depth, sampler, tally)?
                 }
                 Hit::Subject(point) => {
                     let wo = -path.ray.dir;
                     let (globals, exits) = face(&point, wo);
                     let scattering = self.surface.shade(&globals, wo)?;
                     path.radiance += path.throughput * Vec3::from_array(scattering.emission());
-                    depth < self.max_depth && self.scatter(&mut path, &scattering, &exits, depth, sampler, tally)
+                    depth < self.max_depth && self.scatter(&mut path, &scattering, &exits, depth, sampler, tally)?
                 }
             };
             if !goes_on {
@@ -106,55 +116,91 @@ impl<'w, S: Surface> Tracer<'w, S> {
         depth: u32,
         sampler: &mut Sampler,
         tally: &mut Tally,
-    ) -> bool {
+    ) -> Result<bool, ShadeError> {
         let [light_u, light_v, survive, _] = sampler.next4();
         let [u0, u1, u2, _] = sampler.next4();
         if self.sample_env {
-            path.radiance += path.throughput * self.direct(scattering, exits, [light_u, light_v], tally);
+            let sheets = self.max_depth - 1 - depth;
+            path.radiance += path.throughput * self.direct(scattering, exits, sheets, [light_u, light_v], tally)?;
         }
         let Some(sample) = scattering.sample([u0, u1, u2]) else {
-            return false;
+            return Ok(false);
         };
         path.throughput *= Vec3::from_array(sample.weight);
         let wi = Vec3::from(sample.wi);
         if !(path.throughput.is_finite() && wi.is_finite()) {
             // Ends here, and is counted where the sample reaches the film.
             path.radiance = Vec3::NAN;
-            return false;
+            return Ok(false);
         }
         let odds = if depth + 1 < CERTAIN { 1.0 } else { path.throughput.max_element().min(1.0) };
         if survive >= odds || path.throughput.max_element() <= 0.0 {
-            return false;
+            return Ok(false);
         }
         path.throughput /= odds;
+        if !sample.flags.delta {
+            path.pdf = Some(sample.pdf);
+        } else if !goes_straight(-path.ray.dir, wi) {
+            path.pdf = None;
+        }
+        // Straight on, the direction is still the one that the point before chose.
         path.ray = exits.leave(wi);
-        path.pdf = (!sample.flags.delta).then_some(sample.pdf);
-        true
+        Ok(true)
     }
 
-    /// Light from the environment by one direction drawn from it.
-    fn direct(&self, scattering: &impl Scatter, exits: &Exits, u: [f32; 2], tally: &mut Tally) -> Vec3 {
+    /// Light from the environment by one direction drawn from it, through at most `sheets` of the subject's surfaces.
+    fn direct(
+        &self,
+        scattering: &impl Scatter,
+        exits: &Exits,
+        sheets: u32,
+        u: [f32; 2],
+        tally: &mut Tally,
+    ) -> Result<Vec3, ShadeError> {
         let Some(light) = self.world.environment.sample(u) else {
-            return Vec3::ZERO;
+            return Ok(Vec3::ZERO);
         };
         let Eval { f_cos, pdf } = scattering.eval(light.dir);
         let f_cos = Vec3::from_array(f_cos);
         if f_cos == Vec3::ZERO {
-            return Vec3::ZERO;
+            return Ok(Vec3::ZERO);
         }
+        let visible = self.visibility(exits.leave(light.dir), sheets, tally)?;
+        Ok(f_cos * light.radiance * visible * (power_heuristic(light.pdf, pdf) / light.pdf))
+    }
+
+    /// The share of the environment's light that comes through along the ray: whole where nothing stands in between,
+    /// less behind what lets light pass straight.
+    fn visibility(&self, mut ray: Ray, sheets: u32, tally: &mut Tally) -> Result<Vec3, ShadeError> {
         tally.rays += 1;
-        let visible = self.world.visibility(exits.leave(light.dir));
-        if visible == 0.0 {
-            return Vec3::ZERO;
+        if !self.see_through {
+            return Ok(Vec3::splat(self.world.visibility(ray)));
         }
-        f_cos * light.radiance * (visible * power_heuristic(light.pdf, pdf) / light.pdf)
+        let mut through = Vec3::ONE;
+        for _ in 0..=sheets {
+            match self.world.hit(ray) {
+                Hit::Nothing => return Ok(through),
+                Hit::Floor { opacity, .. } => return Ok(through * (1.0 - opacity)),
+                Hit::Subject(point) => {
+                    let wo = -ray.dir;
+                    let (globals, exits) = face(&point, wo);
+                    through *= Vec3::from_array(self.surface.shade(&globals, wo)?.straight());
+                    if through == Vec3::ZERO {
+                        return Ok(through);
+                    }
+                    ray = exits.leave(ray.dir);
+                    tally.rays += 1;
+                }
+            }
+        }
+        Ok(Vec3::ZERO)
     }
 
     /// The environment as the path sees it, weighted against having drawn that direction in [`direct`](Self::direct).
     fn escaped(&self, path: &Path) -> Vec3 {
-        let radiance = self.world.environment.radiance(path.ray.dir);
+        let (radiance, env_pdf) = self.world.environment.look(path.ray.dir);
         match path.pdf {
-            Some(pdf) if self.sample_env => radiance * power_heuristic(pdf, self.world.environment.pdf(path.ray.dir)),
+            Some(pdf) if self.sample_env => radiance * power_heuristic(pdf, env_pdf),
             _ => radiance,
         }
     }
@@ -215,14 +261,18 @@ impl Scatter for Matte {
     }
 
     fn sample(&self, u: [f32; 3]) -> Option<Sample> {
-        let local = cosine_hemisphere::<f32>([u[0], u[1]]);
-        let wi = Vec3::new(local.x, local.z, local.y);
+        let (r, (sin, cos)) = (u[0].sqrt(), (u[1] * TAU).sin_cos());
+        let wi = Vec3::new(r * cos, (1.0 - u[0]).sqrt(), r * sin);
         let Eval { f_cos, pdf } = self.eval(wi);
         let weight = FLOOR_ALBEDO.to_array();
         (pdf > 0.0).then_some(Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default() })
     }
 
     fn emission(&self) -> Rgb32 {
+        [0.0; 3]
+    }
+
+    fn straight(&self) -> Rgb32 {
         [0.0; 3]
     }
 }

@@ -1,7 +1,7 @@
 //! Triangles with smooth normals and tangents, and finding the one a ray hits.
 //!
-//! The tree over them is obvhs's compressed eight-wide BVH: no unsafe code or build steps on our side, the glam types
-//! we use anyway, quick builds. The `bvh` crate would do as well; it is binary and brings nalgebra along.
+//! The tree over them is obvhs's compressed eight-wide BVH: quick to build, quick to walk, and it speaks the glam types
+//! we use anyway. The `bvh` crate would do as well; it is binary and brings nalgebra along.
 
 use super::camera::Ray;
 use super::scene::{EPSILON, Point};
@@ -16,13 +16,17 @@ use std::time::Duration;
 /// A corner shared by triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
+    /// Position.
     pub p: Vec3,
     /// Unit; its side is the front.
     pub n: Vec3,
     /// Surface coordinates, 0 to 1.
     pub u: f32,
+    /// The other one.
     pub v: f32,
+    /// ∂P/∂u.
     pub dpdu: Vec3,
+    /// ∂P/∂v.
     pub dpdv: Vec3,
 }
 
@@ -59,6 +63,7 @@ impl Mesh {
         Mesh { vertices, triangles, corners, tree }
     }
 
+    /// All corners, in the order triangles refer to them.
     pub fn vertices(&self) -> &[Vertex] {
         &self.vertices
     }
@@ -144,4 +149,31 @@ fn meet(triangle: &Triangle, ray: Ray, t_max: f32) -> Option<(f32, [f32; 2])> {
     // A hair beyond the edges, so that no ray slips between neighbours.
     const SLACK: f32 = -1e-6;
     (b >= SLACK && c >= SLACK && b + c <= 1.0 - SLACK && t > 0.0 && t < t_max).then_some((t, [b, c]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::preview::drape_mesh;
+
+    #[test]
+    fn the_tree_finds_what_a_look_at_every_triangle_finds() {
+        let mesh = drape_mesh(24);
+        let mut hits = 0;
+        for i in 0..4000u32 {
+            let [a, b, c, d] = sobol_burley::sample_4d(i, 0, 1);
+            let from = Vec3::new(4.0 * a - 2.0, 3.0 * b, 4.0 * c - 2.0);
+            let to = Vec3::new(2.0 * c - 1.0, 1.5 * d, 2.0 * b - 1.0);
+            let Some(dir) = (to - from).try_normalize() else { continue };
+            let ray = Ray { origin: from, dir };
+            let every = mesh.corners.iter().filter_map(|t| meet(t, ray, f32::INFINITY)).map(|(t, _)| t);
+            let nearest = every.fold(f32::INFINITY, f32::min);
+            let found = mesh.intersect(ray, f32::INFINITY);
+            let t = found.map(|hit| (mesh.surface(hit).p - from).length());
+            assert!(t.map_or(nearest.is_infinite(), |t| (t - nearest).abs() < 1e-4), "{ray:?}: {t:?} {nearest}");
+            assert_eq!(mesh.occluded(ray), found.is_some());
+            hits += u32::from(found.is_some());
+        }
+        assert!(hits > 1000, "{hits}");
+    }
 }

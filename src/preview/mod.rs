@@ -17,6 +17,7 @@ mod integrator;
 mod label;
 mod mesh;
 pub mod output;
+pub mod plot;
 mod sampler;
 mod scene;
 mod sphere;
@@ -29,6 +30,7 @@ pub use drape::drape_mesh;
 pub use environment::Environment;
 pub use image::Image;
 pub use mesh::{Mesh, Vertex};
+pub use studio::lamp;
 pub use surface::{Scatter, Surface};
 pub use tone::display;
 
@@ -52,6 +54,7 @@ pub enum Scene {
 /// Everything but the material that decides a picture.
 #[derive(Clone, Debug)]
 pub struct RenderSettings {
+    /// What the material is shown on.
     pub scene: Scene,
     /// A lat-long HDR or EXR picture to light the scene; the built-in studio if none. [`Scene::Furnace`] ignores it.
     pub env: Option<PathBuf>,
@@ -61,6 +64,7 @@ pub struct RenderSettings {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// Same seed, same picture.
     pub seed: u64,
     /// Worker threads; 0 means one per core. Never changes the picture.
     pub threads: usize,
@@ -110,7 +114,9 @@ impl Control<'static> {
 /// A finished picture and what it took.
 #[derive(Clone, Debug)]
 pub struct Rendered {
+    /// The picture.
     pub image: Image,
+    /// What it took.
     pub stats: Stats,
 }
 
@@ -145,7 +151,12 @@ pub enum RenderError {
     /// A setting is out of range; the text says which.
     Settings(String),
     /// The environment picture cannot be used.
-    Environment { path: PathBuf, reason: String },
+    Environment {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The material failed to shade somewhere.
     Shade(ShadeError),
     /// The worker threads could not be started.
@@ -161,7 +172,7 @@ impl fmt::Display for RenderError {
             RenderError::Environment { path, reason } => {
                 write!(f, "cannot use `{}` as environment: {reason}", path.display())
             }
-            RenderError::Shade(e) => write!(f, "shading failed: {e:?}"),
+            RenderError::Shade(e) => write!(f, "shading failed: {e}"),
             RenderError::Threads(reason) => write!(f, "cannot start the render threads: {reason}"),
             RenderError::Cancelled => f.write_str("the render was stopped"),
         }
@@ -190,7 +201,6 @@ pub struct Stage {
 impl Stage {
     /// Checks the settings, loads the environment and lays out the scene.
     pub fn new(settings: &RenderSettings) -> Result<Stage, RenderError> {
-        check(settings)?;
         let environment = match (settings.scene, &settings.env) {
             (Scene::Furnace, _) => Environment::uniform(1.0),
             (_, Some(path)) => {
@@ -198,6 +208,12 @@ impl Stage {
             }
             (_, None) => studio::environment(),
         };
+        Stage::lit_by(environment, settings)
+    }
+
+    /// Like [`new`](Self::new), lit by `environment` whatever the settings say.
+    pub fn lit_by(environment: Environment, settings: &RenderSettings) -> Result<Stage, RenderError> {
+        check(settings)?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(settings.threads)
             .build()

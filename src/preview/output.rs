@@ -1,7 +1,7 @@
 //! Pictures to files.
 //!
 //! An [`Image`] and a path come in; the file's extension says what becomes of them: `.png` is what a screen shows (see
-//! [`display`](super::display)), `.exr` the linear radiance. A file is written beside its destination and then renamed, so that
+//! [`display`]), `.exr` the linear radiance. A file is written beside its destination and then renamed, so that
 //! a reader never sees half a picture and a failure leaves the old one.
 
 use super::{Image, display};
@@ -16,7 +16,9 @@ use tempfile::NamedTempFile;
 /// What a file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
+    /// 8 bits a channel, as a screen shows it.
     Png,
+    /// Linear radiance.
     Exr,
 }
 
@@ -35,7 +37,9 @@ impl Format {
 /// Why a picture was not written.
 #[derive(Debug)]
 pub struct OutputError {
+    /// The file.
     pub path: PathBuf,
+    /// What went wrong.
     pub reason: String,
 }
 

@@ -104,7 +104,7 @@ impl Floor {
         }
         let t = -ray.origin.y / ray.dir.y;
         let p = ray.origin + ray.dir * t;
-        let x = ((p.x.hypot(p.z) - self.fade[0]) / (self.fade[1] - self.fade[0])).clamp(0.0, 1.0);
+        let x = (((p.x * p.x + p.z * p.z).sqrt() - self.fade[0]) / (self.fade[1] - self.fade[0])).clamp(0.0, 1.0);
         let opacity = 1.0 - x * x * (3.0 - 2.0 * x);
         (opacity > 0.0).then_some((t, opacity))
     }
@@ -115,7 +115,7 @@ pub fn camera(scene: Scene, aspect: f32) -> Camera {
     let (eye, target, degrees) = match scene {
         Scene::Sphere => (vec3(0.0, 2.5, 7.2), vec3(0.0, 0.93, 0.0), 21.5),
         Scene::Furnace => (vec3(0.0, 1.0, 7.2), vec3(0.0, 1.0, 0.0), 21.5),
-        Scene::Drape => (vec3(1.2, 2.9, 7.2), vec3(0.0, 0.72, 0.0), 19.0),
+        Scene::Drape => (vec3(1.2, 2.9, 7.2), vec3(0.03, 0.76, 0.0), 18.5),
     };
     Camera::look_at(eye, target, f32::to_radians(degrees), aspect)
 }

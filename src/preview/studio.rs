@@ -7,8 +7,9 @@
 use super::environment::{Environment, from_square};
 use glam::{Vec3, vec2, vec3};
 
-const WIDTH: usize = 512;
-const HEIGHT: usize = 256;
+/// Enough for lights this soft, and small enough to stay in the cache.
+const WIDTH: usize = 256;
+const HEIGHT: usize = 128;
 
 /// A round light with a soft edge.
 struct Lamp {
@@ -19,10 +20,10 @@ struct Lamp {
 }
 
 const LAMPS: [Lamp; 4] = [
-    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [12.0, 30.0], radiance: vec3(6.0, 5.8, 5.4) },
+    Lamp { toward: vec3(-0.62, 0.80, 0.55), edge: [12.0, 30.0], radiance: vec3(7.2, 6.9, 6.4) },
     Lamp { toward: vec3(0.90, 0.30, 0.50), edge: [10.0, 50.0], radiance: vec3(0.22, 0.24, 0.28) },
-    Lamp { toward: vec3(0.72, 0.50, -0.80), edge: [10.0, 28.0], radiance: vec3(4.6, 4.9, 5.4) },
-    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 26.0], radiance: vec3(3.0, 3.1, 3.3) },
+    Lamp { toward: vec3(0.72, 0.50, -0.80), edge: [10.0, 28.0], radiance: vec3(5.2, 5.5, 6.0) },
+    Lamp { toward: vec3(-0.90, 0.40, -0.75), edge: [8.0, 26.0], radiance: vec3(3.5, 3.6, 3.8) },
 ];
 
 pub fn environment() -> Environment {
@@ -31,6 +32,21 @@ pub fn environment() -> Environment {
         radiance(from_square(at / vec2(WIDTH as f32, HEIGHT as f32)).0)
     });
     Environment::from_pixels(WIDTH, HEIGHT, pixels.collect())
+}
+
+/// One small round light toward `toward`, `degrees` in radius, in a dim grey surrounding.
+pub fn lamp(toward: Vec3, degrees: f32) -> Environment {
+    let (width, height) = (2 * WIDTH, 2 * HEIGHT);
+    let toward = toward.normalize();
+    let edge = degrees.to_radians().cos();
+    // The same light falls on a surface that faces it, whatever its size.
+    let bright = 2.2 / (1.0 - edge) / std::f32::consts::TAU;
+    let pixels = (0..width * height).map(|i| {
+        let at = vec2((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        let dir = from_square(at / vec2(width as f32, height as f32)).0;
+        Vec3::splat(if dir.dot(toward) > edge { bright } else { 0.02 })
+    });
+    Environment::from_pixels(width, height, pixels.collect())
 }
 
 fn radiance(dir: Vec3) -> Vec3 {

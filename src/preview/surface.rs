@@ -3,6 +3,7 @@
 use crate::closure::{Bsdf, Eval, Sample};
 use crate::engine::ShadeError;
 use crate::lobes::Rgb32;
+use crate::lobes::registry::LobeClass;
 use crate::{Globals, Material};
 use glam::Vec3;
 
@@ -15,6 +16,10 @@ pub trait Surface: Sync {
 
     /// The scattering at a point seen from `wo` (unit, world space, away from the surface, on the side of `globals.n`).
     fn shade(&self, globals: &Globals, wo: Vec3) -> Result<Self::Scatter<'_>, ShadeError>;
+
+    /// Whether some light may pass straight through somewhere, see [`Scatter::straight`]. If not, whatever stands
+    /// between a point and a light hides it, and need not be shaded to know.
+    fn see_through(&self) -> bool;
 }
 
 /// Scattering at one point for one ωo. Directions are unit, world space, away from the surface.
@@ -25,6 +30,13 @@ pub trait Scatter {
     fn sample(&self, u: [f32; 3]) -> Option<Sample>;
     /// Radiance given off toward ωo.
     fn emission(&self) -> Rgb32;
+    /// The share of light that passes without changing its direction: the weight of delta lobes toward −ωo.
+    fn straight(&self) -> Rgb32;
+}
+
+/// Whether a ray that came from `wo` and leaves along `wi` has gone straight on, up to rounding.
+pub fn goes_straight(wo: Vec3, wi: Vec3) -> bool {
+    wo.dot(wi) < -1.0 + 2e-6
 }
 
 impl Surface for Material {
@@ -32,6 +44,10 @@ impl Surface for Material {
 
     fn shade(&self, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
         Material::shade(self, globals, wo)
+    }
+
+    fn see_through(&self) -> bool {
+        self.program().sites().iter().any(|site| site.kind.spec().class == LobeClass::Delta)
     }
 }
 
@@ -44,5 +60,10 @@ impl Scatter for Bsdf<'_> {
     }
     fn emission(&self) -> Rgb32 {
         Bsdf::emission(self)
+    }
+    fn straight(&self) -> Rgb32 {
+        let wo = Vec3::from(self.wo());
+        let parts = self.delta_parts().filter(|(wi, _)| goes_straight(wo, Vec3::from(*wi)));
+        parts.fold([0.0; 3], |sum, (_, part)| std::array::from_fn(|c| sum[c] + part[c]))
     }
 }

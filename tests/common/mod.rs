@@ -91,7 +91,19 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     for c in choices.iter().filter(|_| choices.len() <= 3) {
         sets = sets.iter().flat_map(|s| c.iter().map(move |v| [s.as_slice(), &[*v]].concat())).collect();
     }
-    sets.iter().map(|set| block(kind, |p| free.iter().position(|f| f.name == p.name).map(|i| set[i]))).collect()
+    let value = |set: &[f32], name: &str| free.iter().position(|f| f.name == name).map(|i| set[i]);
+    sets.retain(|set| !says_it_again(|name| value(set, name)));
+    sets.iter().map(|set| block(kind, |p| value(set, p.name))).collect()
+}
+
+/// Whether a sheen block differs from another only in a switch its model does not look at.
+fn says_it_again(value: impl Fn(&str) -> Option<f32>) -> bool {
+    let (Some(mode), Some(model), Some(softening)) = (value("mode"), value("model"), value("softening")) else {
+        return false;
+    };
+    let named = model > 0.0;
+    let softens = model == 1.0 || model == 2.0 || (!named && mode == 0.0);
+    (named && mode > 0.0) || (!softens && softening > 0.0)
 }
 
 /// Rows of a table in tests/data as numbers, by column name; text becomes NaN.

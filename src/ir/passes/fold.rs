@@ -19,6 +19,15 @@ pub fn fold(body: &Body, known: &[Option<Cells>]) -> Body {
     folder.new
 }
 
+/// Folds a body without using the initial values of the variables in `open`: what is left reads them at every point.
+pub fn fold_open(body: &Body, open: &[VarId]) -> Body {
+    let mut folder = Folder::new(body, &[]);
+    folder.open = open.to_vec();
+    let stmts = folder.block(&body.stmts);
+    folder.new.stmts = stmts;
+    folder.new
+}
+
 /// The value of one expression that stands alone, if it is constant.
 pub fn constant(body: &Body, root: Root) -> Option<Cells> {
     let mut folder = Folder::new(body, &[]);
@@ -53,6 +62,8 @@ struct Folder<'a> {
     new: Body,
     /// Parameters that are set, until their initialisation has been replaced.
     fixed: Vec<Option<Cells>>,
+    /// Parameters whose initial value is not to be used.
+    open: Vec<VarId>,
     env: Env<Option<Known>>,
     /// The new expression of each old one of the run at hand, from `origin` on.
     map: Vec<ExprId>,
@@ -64,7 +75,7 @@ impl<'a> Folder<'a> {
         let new = Body { vars: old.vars.clone(), strings: old.strings.clone(), ..Body::default() };
         let mut env = Env::new(old.vars.len(), None);
         env.set(VarId::CI, Some(Known::Black));
-        Folder { old, new, fixed: fixed.to_vec(), env, map: Vec::new(), origin: 0 }
+        Folder { old, new, fixed: fixed.to_vec(), open: Vec::new(), env, map: Vec::new(), origin: 0 }
     }
 
     fn block(&mut self, stmts: &[Stmt]) -> Vec<Stmt> {
@@ -88,7 +99,8 @@ impl<'a> Folder<'a> {
                         ExprKind::Black => Some(Known::Black),
                         _ => None,
                     };
-                    self.env.set(*var, known);
+                    let open = self.open.iter().position(|v| v == var).map(|at| self.open.swap_remove(at));
+                    self.env.set(*var, if open.is_some() { None } else { known });
                     out.push(Stmt::Assign(*var, root));
                 }
                 Stmt::If { condition, then, other } => {

@@ -1,0 +1,139 @@
+//! EON: the energy-preserving Oren–Nayar model of Portsmouth, Kutz & Hill 2024.
+//!
+//! A rough diffuse surface (Fujii's form of Oren–Nayar) plus a reciprocal lobe that gives back what light bouncing
+//! between the facets carries on. At roughness 0 it is Lambert; at 0.5 edges stay bright, as on clay; at 1 a lit ball
+//! looks flat, and a saturated albedo gains saturation from the repeated bounces. White stays white at any roughness:
+//! E = 1 exactly for albedo 1, so an even environment hides the ball.
+//!
+//! Where this departs from the paper: its albedo term (sin θ/cos θ)(1 − sin³θ) − sin θ is written without the
+//! difference, so that nothing cancels at grazing angles, and it is sampled by a transformed cosine that keeps the
+//! horizon in place, mixed with a uniform share ([`super::ltc`]), where the paper clips one that does not.
+
+use super::ltc::Ltc;
+use super::ltc_tables::EON;
+use super::registry::closure;
+use super::{Lobe, Rgb};
+use crate::albedo::AlbedoCurve;
+use crate::optics::{Lift, Real, V3};
+use std::f64::consts::{FRAC_1_PI, PI};
+
+closure! {
+    /// Rough diffuse reflection that loses no energy: what bounces between the facets is added back. Roughness 0 is
+    /// Lambert. One-sided.
+    closure "eon" as EonParams {
+        /// Shading normal.
+        normal N;
+        /// Reflectance of the facets; at roughness 0 the albedo of the whole.
+        color albedo = [0.8, 0.8, 0.8], in (0.0, 1.0);
+        /// Spread of the facets' slopes (paper: r).
+        float roughness = 0.5, in (0.0, 1.0);
+    }
+    source: "Portsmouth, Kutz & Hill 2024, eq. 13-24",
+    reciprocal: true,
+    class: Scatter,
+}
+
+/// The paper's constants: ½ − 2/(3π) and ⅔ − 28/(15π).
+const C1: f64 = 0.5 - 2.0 / (3.0 * PI);
+const C2: f64 = 2.0 / 3.0 - 28.0 / (15.0 * PI);
+
+/// See [`EonParams`].
+#[derive(Clone, Copy, Debug)]
+pub struct Eon<S> {
+    wo: V3<S>,
+    rho: Rgb<S>,
+    /// 1/(1 + C1·r), and r times that.
+    a: S,
+    b: S,
+    roughness: S,
+    /// 1/π on the normal's side, else 0.
+    scale: S,
+    /// Albedo of the repeated bounces.
+    rho_ms: Rgb<S>,
+    /// (1 − E(ωo))/(1 − mean E).
+    missing_o: S,
+    ltc: Ltc<S>,
+}
+
+impl<S: Real> Eon<S> {
+    /// The single-scattering albedo for white facets, A + (B/π)·G(μ).
+    fn single<L: Real + Lift<S>>(&self, cos: L) -> L {
+        let cos = cos.clamp(L::zero(), L::one());
+        let sin = (L::one() - cos.sq()).safe_sqrt();
+        let theta = sin.atan2(cos);
+        let near = sin * (theta - sin * cos);
+        // (s/c)(1 − s³) − s = s·[c(1 + s + s²)/(1 + s) − 1].
+        let far = sin * (cos * (L::one() + sin + sin.sq()) / (L::one() + sin) - L::one());
+        let g = L::c(2.0 / 3.0).mul_add(far, near);
+        (L::lift(self.b) * L::c(FRAC_1_PI)).mul_add(g, L::lift(self.a)).min(L::one())
+    }
+
+    fn on_side<L: Real>(cos: L, value: L) -> L {
+        L::select(cos.gt(L::zero()), value, L::zero())
+    }
+
+    /// E for facets of albedo ρ: single scattering and what it leaves to the bounces.
+    fn total<L: Real + Lift<S>>(&self, cos: L) -> Rgb<L> {
+        let e = self.single(cos);
+        std::array::from_fn(|c| {
+            let (rho, ms) = (L::lift(self.rho[c]), L::lift(self.rho_ms[c]));
+            Self::on_side(cos, rho.mul_add(e, ms * (L::one() - e)).min(L::one()))
+        })
+    }
+}
+
+impl<S: Real> Lobe<S> for Eon<S> {
+    type Params = EonParams;
+
+    fn new(params: &EonParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+        let r = S::from_f32(params.roughness);
+        let rho = params.albedo.map(S::from_f32);
+        let a = S::one() / S::c(C1).mul_add(r, S::one());
+        // 1 − A(1 + C2·r), without the difference.
+        let lost = a * r * S::c(C1 - C2);
+        let mean = S::one() - lost;
+        let rho_ms = rho.map(|rho| rho.sq() * mean / (S::one() - rho * lost));
+        let lobe = Eon {
+            wo,
+            rho,
+            a,
+            b: a * r,
+            roughness: r,
+            scale: Self::on_side(wo.z, S::c(FRAC_1_PI)),
+            rho_ms,
+            missing_o: S::zero(),
+            ltc: Ltc::proposal(&EON, wo, r),
+        };
+        let missing = S::one() - lobe.single(wo.z);
+        Eon { missing_o: missing / lost.max(S::c(1e-6)), ..lobe }
+    }
+
+    #[inline(always)]
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        let wo = V3::<L>::lift(self.wo);
+        let s = wo.x.mul_add(wi.x, wo.y * wi.y);
+        let forward = s / wo.z.max(wi.z).max(L::c(1e-6));
+        let s = L::select(s.gt(L::zero()), forward, s);
+        let single = L::lift(self.a) * L::lift(self.roughness).mul_add(s, L::one());
+        let bounced = L::lift(self.missing_o) * (L::one() - self.single(wi.z));
+        let scale = Self::on_side(wi.z, L::lift(self.scale));
+        std::array::from_fn(|c| scale * L::lift(self.rho[c]).mul_add(single, L::lift(self.rho_ms[c]) * bounced))
+    }
+
+    #[inline(always)]
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        self.ltc.pdf(wi)
+    }
+
+    fn sample(&self, u: [S; 2]) -> V3<S> {
+        self.ltc.sample(u)
+    }
+
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+        self.total(w.z)
+    }
+
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+        self.total(w.z)
+    }
+}

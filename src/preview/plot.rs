@@ -1,0 +1,86 @@
+//! Curves as SVG pictures.
+//!
+//! In: named series of points. Out: the text of an SVG file. Drawn by plotters with its SVG backend only; the text is
+//! left to the viewer's fonts.
+
+use plotters::prelude::*;
+
+/// What a plot shows and how.
+pub struct Plot<'a> {
+    /// Stands above the picture.
+    pub title: &'a str,
+    /// What runs along the horizontal axis, with its unit.
+    pub x: &'a str,
+    /// What runs along the vertical axis, with its unit.
+    pub y: &'a str,
+    /// Name and points of every curve.
+    pub series: &'a [(String, Vec<(f64, f64)>)],
+}
+
+/// Colours that are told apart in print and by most eyes (Okabe & Ito 2008).
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(60, 60, 60),
+];
+
+impl Plot<'_> {
+    /// The picture, 720 × 440.
+    ///
+    /// # Errors
+    /// If there is nothing finite to show.
+    pub fn svg(&self) -> Result<String, String> {
+        let points = || self.series.iter().flat_map(|s| &s.1).filter(|p| p.0.is_finite() && p.1.is_finite());
+        let low = |f: fn(&(f64, f64)) -> f64| points().map(f).fold(f64::INFINITY, f64::min);
+        let high = |f: fn(&(f64, f64)) -> f64| points().map(f).fold(f64::NEG_INFINITY, f64::max);
+        let (x0, x1, y0, y1) = (low(|p| p.0), high(|p| p.0), low(|p| p.1).min(0.0), high(|p| p.1));
+        if points().next().is_none() {
+            return Err(format!("{}: nothing to plot", self.title));
+        }
+        let mut text = String::new();
+        self.draw(&mut text, [x0, x1.max(x0 + 1e-9), y0, y1.max(y0 + 1e-9) * 1.04]).map_err(|e| e.to_string())?;
+        Ok(text)
+    }
+
+    fn draw(&self, text: &mut String, [x0, x1, y0, y1]: [f64; 4]) -> Result<(), Box<dyn std::error::Error>> {
+        let area = SVGBackend::with_string(text, (720, 440)).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&area)
+            .caption(self.title, ("sans-serif", 18))
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(56)
+            .build_cartesian_2d(x0..x1, y0..y1)?;
+        chart.configure_mesh().light_line_style(WHITE).x_desc(self.x).y_desc(self.y).draw()?;
+        for (index, (name, points)) in self.series.iter().enumerate() {
+            let color = COLORS[index % COLORS.len()];
+            let finite = points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite());
+            chart
+                .draw_series(LineSeries::new(finite, color.stroke_width(2)))?
+                .label(name.as_str())
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
+        }
+        if self.series.len() > 1 {
+            chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
+        }
+        area.present()?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Plot;
+
+    #[test]
+    fn curves_become_a_picture() {
+        let series = [("a".to_owned(), vec![(0.0, 1.0), (1.0, f64::NAN), (2.0, 3.0)])];
+        let svg = Plot { title: "T", x: "x", y: "y", series: &series }.svg().expect("a picture");
+        assert!(svg.starts_with("<svg") && svg.contains("polyline") && !svg.contains("NaN"));
+        assert!(Plot { title: "T", x: "x", y: "y", series: &[] }.svg().is_err());
+    }
+}

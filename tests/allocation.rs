@@ -1,0 +1,60 @@
+//! Shading up to eight lobes, and evaluating and sampling any number, leave the heap alone.
+#![allow(unsafe_code)]
+
+use overcoat::{Engine, Globals};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// The system's allocator, counting per thread.
+struct Counting;
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call is passed on unchanged to the system's allocator; counting touches only a `const` thread local,
+// which needs no allocation itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|c| c.set(c.get() + 1));
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> u64 {
+    let before = COUNT.with(Cell::get);
+    work();
+    COUNT.with(Cell::get) - before
+}
+
+const EIGHT_LOBES: &str = "
+    Ci = color(0.2, 0.1, 0.1) * diffuse(N) + 0.1 * translucent(N) + u * transparent();
+    Ci = sheen(Ci, N, color(0.5, 0.4, 0.3), 0.2 + 0.5 * u);
+    Ci = sheen(Ci + 0.2 * oren_nayar(normalize(N + 0.1 * dPdu), 0.4), N, 0.3, 0.8);
+    Ci = layer(0.5 * sheen_bsdf(N, 1, 0.5) + 0.1 * diffuse(N), Ci);";
+
+#[test]
+fn shading_evaluating_and_sampling_leave_the_heap_alone() {
+    assert!(allocations(|| drop(std::hint::black_box(vec![0u8; 100]))) > 0, "the counter counts");
+    for script in ["Ci = sheen(diffuse(N), N, 1, 0.3);", EIGHT_LOBES] {
+        let shader = Engine::new().compile("stack", script).expect("compiles");
+        let material = shader.material(&[]).expect("specialises");
+        let globals = Globals { u: 0.3, ..Globals::default() };
+        let count = allocations(|| {
+            for k in 0..100 {
+                let wo = glam::Vec3::new(0.01 * k as f32, 0.2, 0.5).normalize();
+                let bsdf = material.shade(&globals, wo).expect("within budget");
+                let eval = bsdf.eval([0.0, 0.6, 0.8]);
+                let sample = bsdf.sample([0.1, 0.01 * k as f32, 0.4]);
+                std::hint::black_box((eval, sample, bsdf.albedo(), bsdf.delta_albedo()));
+            }
+        });
+        assert_eq!(count, 0, "{script}");
+    }
+}

@@ -1,0 +1,60 @@
+//! What the README says can be done can be done.
+#![cfg(feature = "cli")]
+
+use std::path::Path;
+use std::process::Command;
+
+fn readme() -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md")
+}
+
+#[test]
+fn its_commands_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::os::unix::fs::symlink(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), folder.path().join("examples"))
+        .expect("linked");
+    let mut pictures = 0;
+    for line in readme().lines() {
+        let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
+        let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
+        // The same, but quick.
+        command.current_dir(folder.path()).args(arguments.split_whitespace()).args(["--spp", "1"]);
+        if !arguments.contains("--size") {
+            command.args(["--size", "32"]);
+        }
+        let output = command.output().expect("the program starts");
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        let file = arguments.split_whitespace().skip_while(|a| *a != "-o").nth(1).expect("an output");
+        image::open(folder.path().join(file)).expect("a picture");
+        pictures += 1;
+    }
+    assert!(pictures >= 2, "{pictures} pictures");
+}
+
+#[test]
+fn its_script_compiles_without_a_warning() {
+    let text = readme();
+    let script = text.split("```c\n").nth(1).and_then(|t| t.split("```").next()).expect("a script");
+    let shader = overcoat::Engine::new().compile("readme", script).expect("compiles");
+    assert!(shader.warnings().is_empty());
+    assert_eq!(shader.params().len(), 4);
+}
+
+#[test]
+fn its_table_names_every_command() {
+    let help = Command::new(env!("CARGO_BIN_EXE_overcoat")).arg("--help").output().expect("the program starts");
+    let help = String::from_utf8(help.stdout).expect("text");
+    let commands = help.split("Commands:").nth(1).and_then(|t| t.split("Options:").next()).expect("commands");
+    for line in commands.lines().filter(|l| l.starts_with("  ") && !l.starts_with("   ")) {
+        let name = line.split_whitespace().next().expect("a name");
+        assert!(name == "help" || readme().contains(&format!("`overcoat {name} ")), "README without `{name}`");
+    }
+}
+
+#[test]
+fn its_files_exist() {
+    for link in readme().split("](").skip(1) {
+        let target = link.split(')').next().expect("a target");
+        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(target).exists(), "{target}");
+    }
+}
