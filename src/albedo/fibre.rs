@@ -167,6 +167,9 @@ impl<S: Real> FibreTables<S> {
     }
 }
 
+/// Angles around the thread, in degrees, whose largest albedo a table over a varying parameter holds.
+const TURNS: [f64; 5] = [0.0, 30.0, 60.0, 80.0, 89.99];
+
 impl FibreSpec {
     /// Integrates the components at the nodes, then measures the interpolation between them and lifts the bound.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> FibreTables<S> {
@@ -246,10 +249,10 @@ impl Grid<'_> {
         let mut key = self.spec.key;
         key[axis] = self.parameter(row);
         let mut largest = [0.0f64; COMPONENTS];
-        let turns = if self.spec.around { 4 } else { 1 };
+        let turns: &[f64] = if self.spec.around { &TURNS } else { &[0.0] };
         let across = w.y.hypot(w.z);
-        for k in 0..turns {
-            let (y, z) = (FRAC_PI_2 * k as f64 / turns as f64).sin_cos();
+        for turn in turns {
+            let (y, z) = turn.to_radians().sin_cos();
             let here = self.rule.albedos(self.spec, &key, V3::new(w.x, across * y, across * z));
             largest = std::array::from_fn(|c| largest[c].max(here[c]));
         }
@@ -260,21 +263,32 @@ impl Grid<'_> {
     /// for what lies between the probes.
     fn shortfalls<S: Scalar>(&self, tables: &FibreTables<S>) -> Vec<[f64; COMPONENTS]> {
         let (rows, nodes) = (self.rows, self.nodes);
-        let bands = (rows - 1).max(1);
-        let between = if rows > 1 { 0.5 } else { 0.0 };
-        let probes: Vec<(usize, usize, usize)> = (0..tables.sheets)
-            .flat_map(|s| (0..bands).flat_map(move |r| (0..nodes - 1).map(move |n| (s, r, n))))
-            .collect();
+        // In cells: the middles of cells and of their edges between rows; the last cell of the first band more often,
+        // because its corner is a pole of the threads across, about which the albedo turns within any distance.
+        let mut probes: Vec<(usize, f64, f64)> = Vec::new();
+        for sheet in 0..tables.sheets {
+            for half in 0..2 * rows - 1 {
+                probes.extend((0..nodes - 1).map(|n| (sheet, half as f64 / 2.0, n as f64 + 0.5)));
+                // A full step along the rows lies on a node.
+                if half % 2 == 1 {
+                    probes.extend((0..nodes).map(|n| (sheet, half as f64 / 2.0, n as f64)));
+                }
+            }
+            if self.spec.around && self.spec.axis.is_none() {
+                const NEAR: [f64; 6] = [1e-3, 0.01, 0.04, 0.12, 0.3, 0.7];
+                let last = (nodes - 1) as f64;
+                probes.extend(NEAR.iter().flat_map(|r| NEAR.map(|n| (sheet, *r, last - n * n))));
+            }
+        }
         let missing = parallel(&probes, |&(sheet, row, node)| {
-            let (row, node) = (row as f64 + between, node as f64 + 0.5);
             let truth = self.albedos(sheet, row, node);
             let read = tables.view(self.direction(sheet, row, node).map(S::c), S::c(self.parameter(row)));
             std::array::from_fn::<f64, COMPONENTS, _>(|c| truth[c] - read[c].to_f64())
         });
         let mut lifts = vec![[0.0f64; COMPONENTS]; tables.sheets * rows * nodes];
         for (&(sheet, row, node), missing) in probes.iter().zip(missing) {
-            for r in [row, (row + 1).min(rows - 1)] {
-                for n in [node, node + 1] {
+            for r in [row.floor() as usize, row.ceil() as usize] {
+                for n in [node.floor() as usize, node.ceil() as usize] {
                     let lift = &mut lifts[(sheet * rows + r) * nodes + n];
                     *lift = std::array::from_fn(|c| lift[c].max(1.2 * missing[c]));
                 }

@@ -146,7 +146,9 @@ impl<S: Real> Lobe<S> for Thread<S> {
             width: 2.0 * degrees(1).min(degrees(2)).to_radians(),
             around: true,
             detail: 1.0,
-            margin: 0.0,
+            // The largest albedo around the thread is looked for at a few angles: the surface reflection exceeds it by
+            // up to 0.3 %.
+            margin: if axis.is_some() { 5e-3 } else { 0.0 },
             mirrored: true,
         }))
     }

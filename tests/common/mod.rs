@@ -21,6 +21,20 @@ impl<S: Scalar> Stack<S> {
         Stack { tree, curves, layering: Layering::default() }
     }
 
+    /// Bakes as for a script that does not know the parameters called `unknown` before it shades.
+    pub fn varying(tree: ClosureTree, precision: Precision, unknown: &[&str]) -> Self {
+        let mut curves = Curves::default();
+        for (site, kind, values) in tree.lobes() {
+            let mut known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
+            for p in kind.spec().params.iter().filter(|p| unknown.contains(&p.name)) {
+                let at = kind.spec().slot_of(p.name).expect("its own parameter");
+                known[at..at + p.ty.slots()].fill(None);
+            }
+            curves.set(site, kind.table(&known), precision);
+        }
+        Stack { tree, curves, layering: Layering::default() }
+    }
+
     pub fn bsdf(&self, wo: [S; 3]) -> Bsdf<'_, S> {
         let wo = V3::new(wo[0], wo[1], wo[2]);
         flatten(&self.tree, &Globals::default(), wo, self.layering, &self.curves).expect("within budget")

@@ -1,0 +1,151 @@
+//! The bounds of the lobes that follow a thread, at random directions: with all parameters known, and with tables that
+//! were baked without knowing some.
+
+mod common;
+
+use common::{Stack, block};
+use overcoat::albedo::Precision;
+use overcoat::audit::{Side, Tolerance, albedo};
+use overcoat::closure::ClosureTree;
+use overcoat::lobes::LobeKind;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use std::f64::consts::FRAC_PI_2;
+
+/// In turn: anywhere, close to the horizon, close to the thread's pole, close to the other family's pole.
+fn place(k: usize, rng: &mut Pcg64Mcg) -> [f32; 3] {
+    let [a, b] = [(); 2].map(|_| rng.random::<f64>());
+    let tiny = 10f64.powf(-4.0 * b);
+    let w = match k % 4 {
+        0 => {
+            let r = (1.0 - b * b).sqrt();
+            let (s, c) = (a * std::f64::consts::TAU).sin_cos();
+            [r * c, r * s, b]
+        }
+        1 => {
+            let (s, c) = (a * std::f64::consts::TAU).sin_cos();
+            [c, s, tiny]
+        }
+        2 => [if a < 0.5 { 1.0 } else { -1.0 }, tiny * (6.0 * a).sin(), tiny * (6.0 * a).cos().abs()],
+        _ => [tiny * (6.0 * a).sin(), if a < 0.5 { 1.0 } else { -1.0 }, tiny * (6.0 * a).cos().abs()],
+    };
+    let norm = (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt();
+    w.map(|x| (x / norm) as f32)
+}
+
+fn stack(kind: LobeKind, set: &[(&str, f32)], unknown: &[&str]) -> Stack<f32> {
+    let mut tree = ClosureTree::new();
+    let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
+    let root = tree.lobe(kind, 0, &values);
+    tree.set_root(root);
+    Stack::varying(tree, Precision::STANDARD, unknown)
+}
+
+/// Measures the albedo from both sides and holds it against 1 and against the bound; returns the largest.
+fn hold(kind: LobeKind, set: &[(&str, f32)], varying: &[&str], count: usize, rng: &mut Pcg64Mcg) -> f64 {
+    let stack = stack(kind, set, varying);
+    let mut largest = 0.0f64;
+    for k in 0..count {
+        let w = place(k, rng);
+        let bound = stack.bsdf(w).albedo_bound(w);
+        for side in [Side::View, Side::Light] {
+            let e = albedo(&|w| stack.bsdf(w), side, w, Tolerance { error: 1e-5, evaluations: 60_000 });
+            let place = format!("{kind:?} {set:?}, unknown {varying:?}, {side:?} at {w:?}: {e:?}, bound {bound:?}");
+            assert!(e.max() <= 1.0001, "{place}");
+            assert!((0..3).all(|c| e.value[c] - e.error <= bound[c] as f64 + 1e-4), "{place}");
+            largest = largest.max(e.max());
+        }
+    }
+    largest
+}
+
+/// Blocks of a thread, from sharp to dull.
+const THREADS: [&[(&str, f32)]; 5] = [
+    &[("A", 1.0), ("gamma_s", 1.7), ("gamma_v", 1.4), ("kd", 0.0), ("eta", 1.05)],
+    &[("A", 1.0), ("gamma_s", 5.0), ("gamma_v", 10.0), ("eta", 1.34)],
+    &[("A", 1.0), ("gamma_s", 2.5), ("gamma_v", 7.3), ("eta", 2.9)],
+    &[("A", 1.0), ("kd", 1.0), ("gamma_s", 23.0), ("gamma_v", 41.0), ("eta", 1.7)],
+    &[("A", 1.0), ("gamma_s", 88.0), ("gamma_v", 71.0), ("eta", 1.02)],
+];
+
+#[test]
+fn a_thread_with_a_varying_parameter_never_gains() {
+    let mut rng = Pcg64Mcg::seed_from_u64(21);
+    for name in ["eta", "gamma_s", "gamma_v", "kd", "A"] {
+        for set in THREADS {
+            println!("{name} {set:?}: {:.5}", hold(LobeKind::Thread, set, &[name], 40, &mut rng));
+        }
+    }
+    for set in THREADS {
+        hold(LobeKind::Thread, set, &["eta", "gamma_s"], 40, &mut rng);
+    }
+}
+
+/// What a fabric of exponent n reflects toward `w`: over θh, so that no ridge is missed.
+fn fabric_albedo(n: f64, w: [f64; 3]) -> f64 {
+    let theta = w[0].atan2(w[1].hypot(w[2]));
+    let (lo, hi) = (0.5 * (theta - FRAC_PI_2), 0.5 * (theta + FRAC_PI_2));
+    // 4/I_c · ∫ (1 − |sin θh|)ⁿ cos² (2 θh − θ) dθh, each side of the ridge, graded toward it.
+    let side = |end: f64| {
+        let count = 4000;
+        let term = |k: usize| {
+            let u = (k as f64 + 0.5) / count as f64;
+            let h = end * u.powi(3);
+            3.0 * u * u * end.abs() * (1.0 - h.sin().abs()).powf(n) * (2.0 * h - theta).cos().powi(2)
+        };
+        (0..count).map(term).sum::<f64>() / count as f64
+    };
+    4.0 * (side(lo) + side(hi)) / overcoat::lobes::fabric::normalization(n)
+}
+
+#[test]
+fn fabric_bounds_hold_for_any_exponent() {
+    let mut rng = Pcg64Mcg::seed_from_u64(25);
+    for unknown in [&[][..], &["exponent"], &["roughness", "exponent"]] {
+        let mut most = 0.0f64;
+        for n in [1.0, 1.7, 5.0, 17.0, 29.5, 77.7, 400.0, 770.0, 1000.0] {
+            let stack = stack(LobeKind::Fabric, &[("exponent", n)], unknown);
+            for k in 0..200 {
+                let w = place(k, &mut rng);
+                let (e, bound) = (fabric_albedo(n as f64, w.map(f64::from)), stack.bsdf(w).albedo_bound(w)[0] as f64);
+                assert!(e <= bound + 1e-6, "n {n}, unknown {unknown:?} at {w:?}: {e} above {bound}");
+                most = most.max(bound - e);
+            }
+        }
+        println!("unknown {unknown:?}: at most {most:.4} above the albedo");
+    }
+}
+
+#[test]
+fn a_fabric_with_a_varying_parameter_never_gains() {
+    let mut rng = Pcg64Mcg::seed_from_u64(22);
+    for set in [("roughness", 0.03), ("roughness", 0.47), ("roughness", 0.98), ("exponent", 3.3)] {
+        let unknown = if set.0 == "roughness" { "roughness" } else { "exponent" };
+        for unknown in [&[unknown][..], &["roughness", "exponent"]] {
+            hold(LobeKind::Fabric, &[set], unknown, 40, &mut rng);
+        }
+    }
+}
+
+#[test]
+fn a_cloth_with_a_varying_preset_never_gains() {
+    let mut rng = Pcg64Mcg::seed_from_u64(23);
+    for preset in 0..5 {
+        hold(LobeKind::Microcylinder, &[("preset", preset as f32)], &["preset"], 40, &mut rng);
+    }
+}
+
+#[test]
+fn known_parameters_never_gain_anywhere() {
+    let mut rng = Pcg64Mcg::seed_from_u64(24);
+    for preset in 0..5 {
+        let largest = hold(LobeKind::Microcylinder, &[("preset", preset as f32)], &[], 60, &mut rng);
+        println!("preset {preset}: largest albedo {largest:.5}");
+    }
+    for set in THREADS {
+        hold(LobeKind::Thread, set, &[], 60, &mut rng);
+    }
+    for n in [1.0, 2.6, 17.0] {
+        hold(LobeKind::Fabric, &[("exponent", n)], &[], 60, &mut rng);
+    }
+}
