@@ -69,11 +69,12 @@ fn never_gains(kind: LobeKind, set: &[(&str, f32)]) -> f64 {
     let mut largest = 0.0f64;
     for (theta, phi) in PLACES {
         let w = around(theta, phi);
-        let bound = stack.bsdf(w).albedo_bound(w)[0] as f64;
+        let bound = stack.bsdf(w).albedo_bound(w);
         for side in [Side::View, Side::Light] {
             let e = albedo(&|w| stack.bsdf(w), side, w, Tolerance { error: 1e-5, evaluations: 60_000 });
             assert!(e.max() <= 1.0001, "{kind:?} {set:?} at {theta}, {phi}: {e:?}");
-            assert!(e.max() - e.error.min(1e-4) <= bound + 1e-6, "{kind:?} {set:?} at {theta}, {phi}: {e:?}, {bound}");
+            let below = |c: usize| e.value[c] - e.error.min(1e-4) <= bound[c] as f64 + 1e-6;
+            assert!((0..3).all(below), "{kind:?} {set:?} at {theta}, {phi}: {e:?}, {bound:?}");
             largest = largest.max(e.max());
         }
     }
@@ -224,5 +225,61 @@ fn threads_are_sampled_better_than_uniformly() {
             println!("{set:?} at {theta}, {phi}: {uniform:.4} / {own:.5} = {:.1}", uniform / own);
             assert!(uniform > 1.2 * own);
         }
+    }
+}
+
+#[test]
+fn cloths_never_gain() {
+    for preset in 0..5 {
+        let set = [("preset", preset as f32)];
+        println!("{set:?}: largest albedo {:.5}", never_gains(LobeKind::Microcylinder, &set));
+    }
+}
+
+#[test]
+fn cloth_samples_follow_the_pdf_at_the_poles() {
+    let mut rng = Pcg64Mcg::seed_from_u64(16);
+    for preset in 0..5 {
+        samples_well(LobeKind::Microcylinder, &[("preset", preset as f32)], &mut rng);
+    }
+}
+
+#[test]
+fn cloths_are_sampled_better_than_uniformly() {
+    let mut rng = Pcg64Mcg::seed_from_u64(17);
+    for preset in 0..5 {
+        for (theta, phi) in [(0.0, 0.0), (30.0, 30.0), (60.0, 0.0)] {
+            let set = [("preset", preset as f32)];
+            let (uniform, own) = variances(LobeKind::Microcylinder, &set, around(theta, phi), &mut rng);
+            println!("{set:?} at {theta}, {phi}: {uniform:.5} / {own:.6} = {:.1}", uniform / own);
+        }
+    }
+}
+
+/// Baking is part of compiling a material.
+#[test]
+fn tables_are_small_and_quick() {
+    let known = |kind: LobeKind| common::block(kind, |_| None).into_iter().map(Some).collect::<Vec<_>>();
+    let mut cases = vec![
+        ("fabric", LobeKind::Fabric, known(LobeKind::Fabric)),
+        ("thread", LobeKind::Thread, known(LobeKind::Thread)),
+    ];
+    for (name, kind, slot) in
+        [("fabric, roughness varies", LobeKind::Fabric, 6), ("thread, gamma_s varies", LobeKind::Thread, 11)]
+    {
+        let mut values = known(kind);
+        values[slot] = None;
+        cases.push((name, kind, values));
+    }
+    for preset in 0..5 {
+        let mut values = known(LobeKind::Microcylinder);
+        values[6] = Some(preset as f32);
+        cases.push(("microcylinder", LobeKind::Microcylinder, values));
+    }
+    for (name, kind, values) in cases {
+        let start = std::time::Instant::now();
+        let curve = kind.table(&values).expect("a table").bake::<f32>(Precision::STANDARD);
+        println!("{name}: {:.0} ms, {} bytes", start.elapsed().as_secs_f64() * 1e3, curve.bytes());
+        assert!(curve.bytes() <= 64 << 10);
     }
 }

@@ -24,7 +24,9 @@ pub type FibreKernel = fn(&FibreKey, V3<f64>, &[V3<f64>], &mut [[f64; COMPONENTS
 /// What to bake for a lobe that follows a thread.
 #[derive(Clone, Copy, Debug)]
 pub struct FibreSpec {
+    /// The components of f.
     pub kernel: FibreKernel,
+    /// What the kernel is given.
     pub key: FibreKey,
     /// How many of the components are in use.
     pub components: usize,
@@ -34,13 +36,18 @@ pub struct FibreSpec {
     pub width: f64,
     /// Whether the albedo depends on φ.
     pub around: bool,
+    /// Scales the number of nodes and of quadrature points: less than 1 for lobes that are smooth but slow.
+    pub detail: f64,
+    /// What the bound is lifted by beyond what the precision asks for, relative to the albedo: for kinks that the
+    /// quadrature does not follow.
+    pub margin: f64,
     /// Whether the albedo is even in x.
     pub mirrored: bool,
 }
 
 impl PartialEq for FibreSpec {
     fn eq(&self, o: &Self) -> bool {
-        let parts = |s: &Self| (s.key, s.components, s.axis, s.width, s.around, s.mirrored);
+        let parts = |s: &Self| (s.key, s.components, s.axis, s.width, s.around, s.detail, s.margin, s.mirrored);
         std::ptr::fn_addr_eq(self.kernel, o.kernel) && parts(self) == parts(o)
     }
 }
@@ -163,13 +170,15 @@ impl<S: Real> FibreTables<S> {
 impl FibreSpec {
     /// Integrates the components at the nodes, then measures the interpolation between them and lifts the bound.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> FibreTables<S> {
-        let size = precision.cos_nodes;
+        let scaled = |count: usize| (count as f64 * self.detail) as usize;
+        let size = scaled(precision.cos_nodes);
+        let precision = Precision { polar: scaled(precision.polar), ..precision };
         let flat = !self.around && self.axis.is_none();
-        let nodes = if flat { size } else { (size / 4).clamp(14, 64) };
+        let nodes = if flat { size } else { (size / if self.axis.is_some() { 6 } else { 4 }).clamp(14, 64) };
         let rows = match self.axis {
             Some(_) if self.around => (precision.axis_nodes / 2).max(8),
             Some(_) => precision.axis_nodes,
-            None if self.around => (size / 10).clamp(8, 28),
+            None if self.around => (size / if self.detail < 1.0 { 6 } else { 10 }).clamp(8, 28),
             None => 1,
         };
         let sheets = if self.mirrored { 1 } else { 2 };
@@ -196,7 +205,7 @@ impl FibreSpec {
         for (c, chunk) in tables.bound.chunks_mut(sheets * plane).enumerate() {
             for (bound, lift) in chunk.iter_mut().zip(&lifts) {
                 // Relative as well: these albedos may be far above 1.
-                *bound = *bound * S::c(1.0 + precision.margin) + S::c(precision.margin + lift[c]);
+                *bound = *bound * S::c(1.0 + precision.margin + self.margin) + S::c(precision.margin + lift[c]);
             }
         }
         tables
@@ -286,8 +295,10 @@ impl FibreQuadrature {
     pub fn new(precision: Precision) -> Self {
         let around = Rule::gauss_legendre(precision.azimuth.min(32));
         let point = |(u, w): (&f64, &f64)| {
-            let (sin, cos) = (PI * (u - 0.5)).sin_cos();
-            (sin, cos, w * PI * cos)
+            // Graded toward the horizon, where the other family of a cloth has its poles.
+            let v = 2.0 * u - 1.0;
+            let (sin, cos) = (FRAC_PI_2 * 0.5 * v * (3.0 - v * v)).sin_cos();
+            (sin, cos, w * PI * 1.5 * (1.0 - v * v) * cos)
         };
         FibreQuadrature {
             along: Rule::gauss_legendre(precision.polar.min(40)),

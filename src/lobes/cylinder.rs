@@ -36,14 +36,18 @@ pub fn fresnel<L: Real>(m: L, c: L) -> L {
 /// A direction in the coordinates of a thread.
 #[derive(Clone, Copy, Debug)]
 pub struct Around<R> {
+    /// sin θ.
     pub sin: R,
+    /// cos θ.
     pub cos: R,
-    /// The unit vector (y, z)/cos θ; its second part is cos φ.
+    /// The unit vector (y, z)/cos θ: sin φ.
     pub py: R,
+    /// See `py`; cos φ.
     pub pz: R,
 }
 
 impl<R: Real> Around<R> {
+    /// Of a unit vector in the thread's frame.
     #[inline(always)]
     pub fn new(w: V3<R>) -> Self {
         let cos = w.y.mul_add(w.y, w.z * w.z).sqrt();
@@ -51,6 +55,7 @@ impl<R: Real> Around<R> {
         Around { sin: w.x, cos, py: w.y * inv, pz: w.z * inv }
     }
 
+    /// The same in another type.
     #[inline(always)]
     pub fn lift<S: Real>(o: Around<S>) -> Self
     where
@@ -75,6 +80,7 @@ impl<R: Real> Around<R> {
 /// The surface reflection and the two parts of the volume term, before A and kd.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<R> {
+    /// The surface reflection.
     pub surface: R,
     /// The g(γv) part.
     pub forward: R,
@@ -200,9 +206,19 @@ impl<S: Real> Ridge<S> {
     /// Density over θi.
     #[inline(always)]
     pub fn pdf<L: Real + Lift<S>>(&self, theta: L) -> L {
-        let z = (theta - L::lift(self.center)).abs() / L::lift(self.scale);
-        let e = (-z.min(L::c(80.0))).exp();
-        e / ((L::one() + e).sq() * L::lift(self.scale) * L::lift(self.span))
+        logistic(theta - L::lift(self.center), L::lift(self.scale)) / L::lift(self.span)
+    }
+
+    /// Density over θi of the distribution about `center` before it is cut off.
+    #[inline(always)]
+    pub fn density<L: Real>(theta: L, center: L, sigma: L) -> L {
+        let end = L::c(FRAC_PI_2);
+        logistic(theta - center.clamp(-end, end), sigma * L::c(3f64.sqrt() / PI))
+    }
+
+    /// How much of the whole distribution lies within ±π/2.
+    pub fn span(&self) -> S {
+        self.span
     }
 
     /// θi for a uniform number.
@@ -211,6 +227,12 @@ impl<S: Real> Ridge<S> {
         let end = S::c(FRAC_PI_2);
         self.scale.mul_add((v / (S::one() - v)).ln(), self.center).clamp(-end, end)
     }
+}
+
+#[inline(always)]
+fn logistic<L: Real>(x: L, scale: L) -> L {
+    let e = (-(x.abs() / scale).min(L::c(80.0))).exp();
+    e / ((L::one() + e).sq() * scale)
 }
 
 /// A direction from θi and a uniform number for φi, with density ½ cos φi.

@@ -174,6 +174,8 @@ impl<S: Real> Lobe<S> for Fabric<S> {
             width: 2.0 / n.unwrap_or(60.0).max(1.0),
             // f does not depend on φ: neither does its integral over the half circle around the thread.
             around: false,
+            detail: 1.0,
+            margin: 0.0,
             mirrored: true,
         }))
     }

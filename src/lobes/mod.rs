@@ -9,12 +9,14 @@ pub mod ltc;
 pub mod registry;
 
 mod charlie_terms;
+mod cloth;
 pub mod cylinder;
 pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
 mod ltc_tables;
+pub mod microcylinder;
 pub mod oren_nayar;
 pub mod sheen;
 pub mod thread;
@@ -182,6 +184,7 @@ lobes! {
     oren_nayar::OrenNayar,
     sheen::Sheen,
     thread::Thread,
+    microcylinder::Microcylinder,
     velvet::Velvet,
     eon::Eon,
 }

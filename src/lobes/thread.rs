@@ -18,6 +18,7 @@ use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
 use crate::optics::{Lift, Real, V3, sampling};
+use std::f64::consts::PI;
 
 closure! {
     /// Dielectric threads lying along T: a streak of surface reflection and colored light from inside. One-sided:
@@ -50,7 +51,7 @@ const EVEN: usize = 2;
 
 /// Where parameters that vary are bounded over their whole range, the components' albedos are at most this; the last
 /// two over max(cos θ, [`MIN_COS`]).
-const WHOLE_RANGE: [f64; COMPONENTS] = [1.6, 2.6, 1.6];
+const WHOLE_RANGE: [f64; COMPONENTS] = [1.1, 3.6, 1.3];
 const MIN_COS: f64 = 0.02;
 
 /// See [`ThreadParams`].
@@ -144,6 +145,8 @@ impl<S: Real> Lobe<S> for Thread<S> {
             axis,
             width: 2.0 * degrees(1).min(degrees(2)).to_radians(),
             around: true,
+            detail: 1.0,
+            margin: 0.0,
             mirrored: true,
         }))
     }
@@ -158,7 +161,7 @@ impl<S: Real> Lobe<S> for Thread<S> {
             ((value - S::c(lo)) / S::c(hi - lo)).safe_sqrt()
         };
         let places = [place(0, eta), place(1, gamma_s), place(2, gamma_v)];
-        let radians = S::c(2.0 * std::f64::consts::PI / 180.0);
+        let radians = S::c(2.0 * PI / 180.0);
         let ridge = |gamma: S| Ridge::new(-o.angle(), gamma * radians);
         let a = p.A.map(S::from_f32);
         let mut lobe = Thread {
@@ -203,7 +206,7 @@ impl<S: Real> Lobe<S> for Thread<S> {
         let [a, b] = self.shares.map(L::lift);
         let ridges = a * self.ridges[0].pdf(theta) + b * self.ridges[1].pdf(theta);
         let inv = L::c(0.5) / i.cos.sq().max(L::c(1e-12));
-        let even = (L::one() - a - b) * L::c(std::f64::consts::FRAC_1_PI);
+        let even = (L::one() - a - b) * L::c(1.0 / PI);
         wi.z.max(L::zero()) * ridges.mul_add(inv, even)
     }
 
@@ -231,5 +234,37 @@ impl<S: Real> Lobe<S> for Thread<S> {
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         let e = self.bounds(w, curve);
         std::array::from_fn(|c| self.mix(e, c).min(L::one()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::albedo::Precision;
+
+    #[test]
+    fn the_whole_range_is_bounded() {
+        let mut largest = [0.0f64; COMPONENTS];
+        for (eta, gamma) in
+            [1.0, 1.3, 2.0, 3.0].iter().flat_map(|e| [1.0, 3.0, 10.0, 30.0, 60.0, 90.0].map(|g| (*e, g)))
+        {
+            let mut values = [Some(0.3f32); 13];
+            (values[9], values[11], values[12]) = (Some(eta), Some(gamma), Some(gamma));
+            let curve = Thread::<f32>::table(&values).expect("known").bake::<f64>(Precision::FAST);
+            for k in 0..2000 {
+                let (theta, phi) = ((k % 50) as f64 / 49.0, (k / 50) as f64 / 40.0);
+                let (theta, phi) = (PI / 2.0 * (1.0 - (1.0 - theta).powi(3)), PI / 2.0 * phi);
+                let (s, c) = theta.sin_cos();
+                let w = V3::new(s, c * phi.sin(), c * phi.cos());
+                let [a, b, d] = curve.fibre().view(w, 0.0);
+                let cos = c.max(MIN_COS);
+                for (l, e) in largest.iter_mut().zip([a, b * cos, d * cos]) {
+                    *l = l.max(e);
+                }
+            }
+        }
+        println!("largest {largest:?}");
+        assert!((0..COMPONENTS).all(|c| largest[c] < WHOLE_RANGE[c]), "{largest:?}");
+        assert!((0..COMPONENTS).all(|c| 1.3 * largest[c] > WHOLE_RANGE[c]), "needlessly wide: {largest:?}");
     }
 }

@@ -1,0 +1,377 @@
+//! Woven cloth of two families of threads: what the two `microcylinder` lobes share (Sadeghi et al. 2013, §6). Not a
+//! lobe itself.
+//!
+//! The warp runs along x, the weft along y. Each family covers a part of the cloth, and its threads bend over and under
+//! one another: their tangents leave the surface by offsets that follow a piecewise-linear curve. With t over the
+//! tangents, a their areas, S the thread's function and z⁺ the cosine to the tangent's own normal:
+//!
+//! f = Σ a·S·M(ωi, ωo) / (Q(ωi)·Q(ωo)), M = (1 − u)·zi⁺·zo⁺ + u·min(cos φi⁺, cos φo⁺)·cos θi·cos θo,
+//! Q(ω) = Σ a·z⁺ + (1 − a₁ − a₂)·μ.
+//!
+//! M is the paper's shadowing and masking, u its blend toward full correlation when both directions are on the same
+//! side of the thread; Q its reweighting, which lets what is seen of all threads fill the cloth's area.
+//!
+//! Where this departs from the paper: it reweights the viewer's side alone, so that its cloth is not reciprocal (seen
+//! from the light, E reaches 59); here light and viewer are treated alike. With flat threads and u = 0 this is a·S, as
+//! for the `thread` lobe. u = exp(−(1 − cos φd)/σ²), σ = 20°, in place of a Gaussian in φd: the same to third order.
+//! The curve of offsets is replaced by [`TANGENTS`] tangents, each widened by the spread of those it stands for.
+
+use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
+use super::{Rgb, Rgb32};
+use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, TableSpec};
+use crate::optics::{Lift, Real, V3, sampling};
+use std::f64::consts::PI;
+
+/// Tangents per family.
+pub const TANGENTS: usize = 5;
+
+/// One family of threads, angles in degrees.
+#[derive(Clone, Copy, Debug)]
+pub struct Yarn {
+    pub color: Rgb32,
+    pub eta: f32,
+    pub kd: f32,
+    pub gamma_s: f32,
+    pub gamma_v: f32,
+    /// Part of the cloth's area.
+    pub cover: f32,
+    /// First and last offset of the tangents.
+    pub lo: f32,
+    pub hi: f32,
+    /// How often each of the offsets between them occurs.
+    pub weights: &'static [f64; TANGENTS],
+}
+
+/// Offsets spread evenly from the first to the last.
+pub const EVENLY: &[f64; TANGENTS] = &weights(&[-1.0, 1.0]);
+
+/// How much of a piecewise-linear curve, its segments equally long, falls to each of the evenly spaced offsets from its
+/// least to its largest value: each point of it is shared by the two offsets it lies between.
+pub const fn weights(curve: &[f64]) -> [f64; TANGENTS] {
+    const STEPS: usize = 256;
+    let (mut lo, mut hi) = (curve[0], curve[0]);
+    let mut i = 1;
+    while i < curve.len() {
+        if curve[i] < lo {
+            lo = curve[i];
+        }
+        if curve[i] > hi {
+            hi = curve[i];
+        }
+        i += 1;
+    }
+    let mut weights = [0.0; TANGENTS];
+    let segments = curve.len() - 1;
+    let share = 1.0 / (segments * STEPS) as f64;
+    let mut segment = 0;
+    while segment < segments {
+        let mut step = 0;
+        while step < STEPS {
+            let along = (step as f64 + 0.5) / STEPS as f64;
+            let value = curve[segment] + (curve[segment + 1] - curve[segment]) * along;
+            let place = (value - lo) / (hi - lo) * (TANGENTS - 1) as f64;
+            let at = place as usize;
+            let at = if at > TANGENTS - 2 { TANGENTS - 2 } else { at };
+            let part = place - at as f64;
+            weights[at] += share * (1.0 - part);
+            weights[at + 1] += share * part;
+            step += 1;
+        }
+        segment += 1;
+    }
+    weights
+}
+
+/// The proposal for θi of one family: a ridge per tangent, taken as often as the tangent is seen.
+#[derive(Clone, Copy, Debug)]
+struct Ridges<S> {
+    /// Center of the first tangent's ridge, and the step to the next.
+    first: S,
+    step: S,
+    sigma: S,
+    /// How much of each tangent's whole distribution there is; what lies beyond ±π/2 is left out.
+    parts: [S; TANGENTS],
+}
+
+impl<S: Real> Ridges<S> {
+    fn at(&self, k: usize) -> Ridge<S> {
+        Ridge::new(self.step.mul_add(S::c(k as f64), self.first), self.sigma)
+    }
+
+    #[inline(always)]
+    fn pdf<L: Real + Lift<S>>(&self, theta: L) -> L {
+        let mut sum = L::zero();
+        for (k, part) in self.parts.iter().enumerate() {
+            let center = self.step.mul_add(S::c(k as f64), self.first);
+            sum += L::lift(*part) * Ridge::<S>::density(theta, L::lift(center), L::lift(self.sigma));
+        }
+        sum
+    }
+
+    fn sample(&self, u: S) -> S {
+        let mut rest = u;
+        let mut theta = -self.first;
+        let mut open = S::one();
+        for (k, part) in self.parts.iter().enumerate() {
+            let ridge = self.at(k);
+            let p = *part * ridge.span();
+            let inside = open.gt(S::zero()) & rest.lt(p);
+            theta = S::select(inside, ridge.sample((rest / p.max(S::c(1e-9))).clamp(S::zero(), S::one())), theta);
+            open = S::select(inside, S::zero(), open);
+            rest -= p;
+        }
+        theta
+    }
+}
+
+/// A family, prepared.
+#[derive(Clone, Copy, Debug)]
+struct Family<S> {
+    cylinder: Cylinder<S>,
+    /// Cosine and sine of the first offset and of the step between offsets.
+    first: (S, S),
+    step: (S, S),
+    weights: &'static [f64; TANGENTS],
+    cover: S,
+    kd: S,
+    color: Rgb<S>,
+    ridges: Ridges<S>,
+    /// How often it is sampled.
+    share: S,
+}
+
+impl<S: Real> Family<S> {
+    fn new(yarn: &Yarn, share: f64, wo: V3<S>) -> Self {
+        let radians = |degrees: f32| S::c(degrees as f64 * PI / 180.0);
+        let turn = |angle: S| {
+            let (s, c) = angle.sin_cos();
+            (c, s)
+        };
+        let range = yarn.hi as f64 - yarn.lo as f64;
+        let step = radians(yarn.hi) - radians(yarn.lo);
+        let step = step * S::c(1.0 / (TANGENTS - 1) as f64);
+        // A tangent stands for an interval as wide as the step: a standard deviation of step/√12.
+        let spread = step * S::c(12f64.sqrt().recip());
+        // What comes from inside is most of it, and the wider.
+        let width = (yarn.gamma_v as f64).to_radians();
+        let sigma = 2.0 * width.hypot(range.to_radians() / ((TANGENTS - 1) as f64 * 12f64.sqrt()));
+        // An offset δ moves the ridge by −2δ.
+        let two = S::c(2.0);
+        let center = -(Around::new(wo).angle() + two * radians(yarn.lo));
+        let mut ridges =
+            Ridges { first: center, step: -(two * step), sigma: S::c(sigma), parts: yarn.weights.map(S::c) };
+        let (mut total, mut weight, mut all) = (S::c(1e-9), S::zero(), S::c(1e-9));
+        for k in 0..TANGENTS {
+            let (sin, cos) = (radians(yarn.lo) + step * S::c(k as f64)).sin_cos();
+            let seen = (cos * wo.z - sin * wo.x).max(S::c(0.05));
+            // Steep threads, at 45° and more, have their cone about the normal: it is no ridge along this family.
+            let flat = (cos * cos - sin * sin).max(S::c(0.0));
+            ridges.parts[k] *= seen;
+            weight += ridges.parts[k] * flat;
+            all += ridges.parts[k];
+            ridges.parts[k] *= flat.max(S::c(1e-3));
+            total += ridges.parts[k] * ridges.at(k).span();
+        }
+        ridges.parts = ridges.parts.map(|p| p / total);
+        Family {
+            cylinder: Cylinder::new(
+                S::from_f32(yarn.eta),
+                S::from_f32(yarn.gamma_s),
+                S::from_f32(yarn.gamma_v),
+                spread,
+            ),
+            first: turn(radians(yarn.lo)),
+            step: turn(step),
+            weights: yarn.weights,
+            cover: S::from_f32(yarn.cover),
+            kd: S::from_f32(yarn.kd),
+            color: yarn.color.map(S::from_f32),
+            ridges,
+            share: S::c(0.75) * weight / all * S::c(share),
+        }
+    }
+
+    /// Adds Σ a·S·M to the surface and volume sums, and Σ a·z⁺ of ωi to `q`.
+    #[inline(always)]
+    fn add<L: Real + Lift<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
+        let (mut cos, mut sin) = (L::lift(self.first.0), L::lift(self.first.1));
+        let (step_cos, step_sin) = (L::lift(self.step.0), L::lift(self.step.1));
+        let (zero, kd) = (L::zero(), L::lift(self.kd));
+        // The tangent at this offset becomes x, its normal z.
+        // A flat family has one tangent.
+        let count = if self.weights[1..].iter().all(|w| *w == 0.0) { 1 } else { TANGENTS };
+        for weight in &self.weights[..count] {
+            let turned = |w: V3<L>| V3::new(cos * w.x + sin * w.z, w.y, cos * w.z - sin * w.x);
+            let (lo, li) = (turned(wo), turned(wi));
+            let (o, i) = (Around::new(lo), Around::new(li));
+            let area = L::lift(self.cover) * L::c(*weight);
+            *q += area * li.z.max(zero);
+            let correlated = (L::c(-0.5 / (20.0 * PI / 180.0f64).powi(2)) * o.turn(i)).exp();
+            let apart = lo.z.max(zero) * li.z.max(zero);
+            let together = o.pz.min(i.pz).max(zero) * o.cos * i.cos;
+            let seen = area * correlated.mul_add(together - apart, apart);
+            let Parts { surface: s, forward, even } = self.cylinder.parts(o, i);
+            *surface += seen * s;
+            *volume += seen * kd.mul_add(even - forward, forward);
+            (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
+        }
+    }
+}
+
+/// Least Q: where no thread shows itself.
+const MIN_Q: f64 = 1e-4;
+/// The components of the tables.
+const SURFACE: usize = 0;
+const WARP: usize = 1;
+const WEFT: usize = 2;
+/// Where the cloth varies, the components' albedos are at most this over max(μ, 0.02).
+pub const WHOLE_RANGE: f64 = 4.0;
+
+/// A cloth prepared for one ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct Cloth<S> {
+    families: [Family<S>; 2],
+    wo: V3<S>,
+    /// 1/Q(ωo) above the surface, else 0.
+    scale: S,
+    /// What lies between the threads: 1 − a₁ − a₂.
+    gap: S,
+    excess: Rgb<S>,
+}
+
+/// The weft's thread coordinates: along y.
+#[inline(always)]
+fn across<R: Real>(w: V3<R>) -> V3<R> {
+    V3::new(w.y, -w.x, w.z)
+}
+
+impl<S: Real> Cloth<S> {
+    pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        let total = (yarns[0].cover as f64 + yarns[1].cover as f64).max(1.0);
+        let covered = (yarns[0].cover + yarns[1].cover).max(1e-6);
+        let sampled = |i: usize| (yarns[i].cover / covered) as f64;
+        let share = |i: usize| Yarn { cover: (yarns[i].cover as f64 / total) as f32, ..yarns[i] };
+        let families = [Family::new(&share(0), sampled(0), wo), Family::new(&share(1), sampled(1), across(wo))];
+        let gap = (S::one() - families[0].cover - families[1].cover).max(S::zero());
+        let one = S::one();
+        let mut cloth = Cloth { families, wo, scale: one, gap, excess: [one; 3] };
+        let (_, _, q) = cloth.sums::<S>(wo);
+        cloth.scale = S::select(wo.z.gt(S::zero()), one / q, S::zero());
+        let e = Self::bounds(wo, curve);
+        for c in 0..3 {
+            cloth.excess[c] = cloth.mix(e, c).max(one);
+        }
+        cloth
+    }
+
+    /// The surface sum, the volume sums and Q(ωi).
+    #[inline(always)]
+    fn sums<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L, [L; 2], L) {
+        let wo = V3::<L>::lift(self.wo);
+        let mut q = L::lift(self.gap) * wi.z.max(L::zero());
+        let (mut surface, mut volume) = (L::zero(), [L::zero(); 2]);
+        self.families[0].add(wo, wi, &mut surface, &mut volume[0], &mut q);
+        self.families[1].add(across(wo), across(wi), &mut surface, &mut volume[1], &mut q);
+        (surface, volume, q.max(L::c(MIN_Q)))
+    }
+
+    #[inline(always)]
+    fn parts<L: Real + Lift<S>>(&self, wi: V3<L>) -> [L; COMPONENTS] {
+        let (surface, volume, q) = self.sums(wi);
+        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale) / q, L::zero());
+        [surface * scale, volume[0] * scale, volume[1] * scale]
+    }
+
+    #[inline(always)]
+    fn mix<L: Real + Lift<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
+        let warp = L::lift(self.families[0].color[channel]) * parts[WARP];
+        L::lift(self.families[1].color[channel]).mul_add(parts[WEFT], parts[SURFACE] + warp)
+    }
+
+    #[inline(always)]
+    fn bounds<L: Real + Lift<S>>(w: V3<L>, curve: &AlbedoCurve<S>) -> [L; COMPONENTS] {
+        if !curve.fibre().is_empty() {
+            return curve.fibre().bound(w, L::zero());
+        }
+        let e = L::c(WHOLE_RANGE) / w.z.max(L::c(0.02));
+        [L::select(w.z.gt(L::zero()), e, L::zero()); COMPONENTS]
+    }
+
+    #[inline(always)]
+    pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        let (parts, e) = (self.parts(wi), Self::bounds(wi, curve));
+        std::array::from_fn(|c| self.mix(parts, c) / self.mix(e, c).max(L::lift(self.excess[c])))
+    }
+
+    /// Which part of the samples follows the families' ridges; the rest follows the cosine.
+    #[inline(always)]
+    fn shares(&self) -> [S; 2] {
+        [self.families[0].share, self.families[1].share]
+    }
+
+    pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let density = |family: &Family<S>, w: V3<L>| {
+            let i = Around::new(w);
+            family.ridges.pdf(i.angle()) * L::c(0.5) / i.cos.sq().max(L::c(1e-12))
+        };
+        let [a, b] = self.shares().map(L::lift);
+        let ridges = a * density(&self.families[0], wi) + b * density(&self.families[1], across(wi));
+        let even = (L::one() - a - b) * L::c(std::f64::consts::FRAC_1_PI);
+        wi.z.max(L::zero()) * (ridges + even)
+    }
+
+    pub fn sample(&self, u: [S; 2]) -> V3<S> {
+        let [a, b] = self.shares();
+        let (first, second) = (u[0].lt(a), u[0].lt(a + b));
+        let choose = |x: S, y: S, z: S| S::select(first, x, S::select(second, y, z));
+        let tiny = S::c(1e-9);
+        let v = choose(u[0] / a.max(tiny), (u[0] - a) / b.max(tiny), (u[0] - a - b) / (S::one() - a - b));
+        let v = v.clamp(S::zero(), S::one());
+        let warp = around_thread(self.families[0].ridges.sample(v), u[1]);
+        let weft = around_thread(self.families[1].ridges.sample(v), u[1]);
+        let even = sampling::cosine_hemisphere([v, u[1]]);
+        // The inverse of `across`.
+        V3::new(choose(warp.x, -weft.y, even.x), choose(warp.y, weft.x, even.y), choose(warp.z, weft.z, even.z))
+    }
+
+    pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        let bound = Self::bounds(w, curve);
+        let e = if curve.fibre().is_empty() { bound } else { curve.fibre().view(w, S::zero()) };
+        std::array::from_fn(|c| self.mix(e, c) / self.mix(bound, c).max(S::one()))
+    }
+
+    #[inline(always)]
+    pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        let e = Self::bounds(w, curve);
+        std::array::from_fn(|c| self.mix(e, c).min(L::one()))
+    }
+}
+
+/// What to bake for a cloth that `kernel` integrates: [`integrate`] of the yarns its key stands for.
+pub fn table(kernel: FibreKernel, key: FibreKey, yarns: &[Yarn; 2]) -> TableSpec {
+    let width = yarns.iter().map(|y| 2.0 * y.gamma_s.min(y.gamma_v).to_radians() as f64).fold(1.0, f64::min);
+    let symmetric = |y: &Yarn| {
+        let flat = y.lo == 0.0 && y.hi == 0.0;
+        flat || y.lo == -y.hi && (0..TANGENTS).all(|i| (y.weights[i] - y.weights[TANGENTS - 1 - i]).abs() < 1e-9)
+    };
+    TableSpec::Fibre(FibreSpec {
+        kernel,
+        key,
+        components: COMPONENTS,
+        axis: None,
+        width: width.max(0.12),
+        around: true,
+        detail: 0.7,
+        // Every tangent has a horizon of its own.
+        margin: 4e-3,
+        mirrored: yarns.iter().all(symmetric),
+    })
+}
+
+/// The components of f for many ωi, before any division.
+pub fn integrate(yarns: &[Yarn; 2], wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
+    let cloth = Cloth::<f64>::new(yarns, wo, &AlbedoCurve::default());
+    for (out, wi) in out.iter_mut().zip(wi) {
+        *out = cloth.parts(*wi);
+    }
+}
