@@ -147,7 +147,8 @@ fn lobes_lists_every_closure() {
 
 #[test]
 fn cost_measures_before_and_after() {
-    let cost = json(&["cost", &example("satin_lining.osl"), "--json", "--set", "softness=0.1"], "");
+    let varying = "surface s(float r = 0.1) { Ci = sheen(diffuse(N), N, 1, r + 0.5 * u); }";
+    let cost = json(&["cost", "-", "--json", "--set", "r=0.2"], varying);
     assert_eq!(cost["constant"], false);
     assert_eq!(cost["globals"], serde_json::json!(["N", "u"]));
     assert_eq!(cost["lobes"], serde_json::json!(["diffuse", "sheen_bsdf"]));

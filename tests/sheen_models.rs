@@ -94,8 +94,8 @@ fn albedo_errors<S: Scalar>(
     worst
 }
 
-/// From here up: at cos 0.001 itself the clamp of both cosines shows (1.2e-4 in E, 1.5e-3 in its table).
-const FITTED: (f64, f64) = (0.07, 0.002);
+/// The fits from here up.
+const FITTED: (f64, f64) = (0.07, 0.001);
 
 fn check_columns<S: Scalar>(tier: &str, precision: Precision, limit: f64) {
     type Column = (&'static str, usize, Side, (f64, f64), fn(f64) -> ClosureTree);

@@ -114,7 +114,8 @@ impl<S: Real> Lobe<S> for Eon<S> {
         let s = wo.x.mul_add(wi.x, wo.y * wi.y);
         let forward = s / wo.z.max(wi.z).max(L::c(1e-6));
         let s = L::select(s.gt(L::zero()), forward, s);
-        let single = L::lift(self.a) * L::lift(self.roughness).mul_add(s, L::one());
+        // s ≥ −1 for unit vectors; longer ones must not turn f negative.
+        let single = L::lift(self.a) * L::lift(self.roughness).mul_add(s, L::one()).max(L::zero());
         let bounced = L::lift(self.missing_o) * (L::one() - self.single(wi.z));
         let scale = Self::on_side(wi.z, L::lift(self.scale));
         std::array::from_fn(|c| scale * L::lift(self.rho[c]).mul_add(single, L::lift(self.rho_ms[c]) * bounced))

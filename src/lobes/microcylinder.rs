@@ -1,6 +1,6 @@
 //! Woven cloth by name: the microcylinder model of Sadeghi, Bisker, De Deken & Jensen 2013.
 //!
-//! Warp and weft as two families of dielectric threads; [`super::cloth`] has the formula and where it departs from the
+//! Warp and weft as two families of dielectric threads; `cloth.rs` has the formula and where it departs from the
 //! paper. `linen`: a soft, nearly even sheen. `silk_crepe`: two broad streaks across the warp. `satin`: sharp, bright
 //! bands. `shot_silk`: green along the warp, red where the weft shows at grazing angles. `velvet`: dark but for the rim,
 //! its warp standing out of the cloth.

@@ -15,7 +15,7 @@
 //! | `charlie_v` | Narkowicz 2018: G/(4μoμi) = 1/(4(μo + μi − μoμi)) | 0.02 | ignored | bounded |
 //! | `zeltner` | a transformed cosine fitted to `exact`, scaled by its E | 0.05 | ignored | bounded |
 //!
-//! Where this departs from the sources: under the fits both cosines are clamped to 1e-3 inside Λ and in the
+//! Where this departs from the sources: under the fits both cosines are clamped to 1e-4 inside Λ and in the
 //! denominator, because the fitted Λ saturates toward grazing where the true one grows without bound, so that the raw
 //! lobe gains energy (E = 6.1 at r = 0.001). Inside these limits E of `conty_kulla` stays below 0.99 and that of
 //! `refit` below 0.95, from both sides. A bounded model is divided by max(1, Ē(ωo), Ē(ωi)): D·V gains below r = 0.204,
@@ -122,7 +122,7 @@ pub(super) const FORMS: &[Form] = &[
 ];
 
 /// Cosines below this are taken as this inside the fitted Λ and in its denominator.
-const MIN_COS: f64 = 1e-3;
+const MIN_COS: f64 = 1e-4;
 
 /// One model with its switches thrown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

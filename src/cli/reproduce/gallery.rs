@@ -16,6 +16,12 @@ const STRIPS: &[(&str, &str, &str, &[&str])] = &[
     ("velvet", "roughness", "Ci = layer(velvet(N, {}), GROUND);", &["0.1", "0.3", "1"]),
     ("fabric", "roughness", "Ci = color(0.7, 0.1, 0.15) * fabric(N, dPdu, {});", &["0", "0.5", "1"]),
     ("thread", "gamma_s", "Ci = thread(N, dPdu, color(0.5, 0.1, 0.1), 1.46, 0.3, {}, 24);", &["3", "12", "30"]),
+    (
+        "microcylinder",
+        "",
+        "Ci = 2 * microcylinder(N, dPdu, \"{}\");",
+        &["linen", "silk_crepe", "satin", "shot_silk", "velvet"],
+    ),
     ("eon", "roughness", "Ci = eon(N, color(0.6, 0.3, 0.2), {});", &["0", "0.5", "1"]),
     ("oren_nayar", "sigma", "Ci = color(0.6, 0.3, 0.2) * oren_nayar(N, {});", &["0", "0.4", "1.2"]),
 ];
@@ -26,7 +32,7 @@ pub fn strips(bench: &Bench<'_>) -> Result<Figure, Failure> {
     for (name, parameter, script, values) in STRIPS {
         let panels: Vec<(String, String)> = values
             .iter()
-            .map(|v| (format!("{parameter} {v}"), script.replace("GROUND", GROUND).replace("{}", v)))
+            .map(|v| (format!("{parameter} {v}").trim().to_owned(), script.replace("GROUND", GROUND).replace("{}", v)))
             .collect();
         files.push(bench.strip(&format!("lobe-{name}"), &stage, &panels)?);
     }

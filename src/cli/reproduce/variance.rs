@@ -19,6 +19,9 @@ const LOBES: &[(&str, &str, &[f64])] = &[
     ("velvet", "Ci = velvet(N, {});", &[0.1, 0.3, 1.0]),
     ("fabric", "Ci = fabric(N, dPdu, {});", &[0.0, 0.5, 1.0]),
     ("thread", "Ci = thread(N, dPdu, color(0.3), 1.46, 0.3, {}, 20);", &[5.0, 12.0, 30.0]),
+    ("microcylinder linen", "Ci = microcylinder(N, dPdu, \"linen\");", &[0.0]),
+    ("microcylinder satin", "Ci = microcylinder(N, dPdu, \"satin\");", &[0.0]),
+    ("microcylinder shot_silk", "Ci = microcylinder(N, dPdu, \"shot_silk\");", &[0.0]),
 ];
 
 const DEGREES: [f64; 5] = [0.0, 30.0, 60.0, 80.0, 87.0];
