@@ -141,7 +141,8 @@ struct Family<S> {
 }
 
 impl<S: Real> Family<S> {
-    fn new(yarn: &Yarn, share: f64, wo: V3<S>) -> Self {
+    /// `samples`: whether it is ever sampled; integrating needs no proposal.
+    fn new(yarn: &Yarn, share: f64, wo: V3<S>, samples: bool) -> Self {
         let radians = |degrees: f32| S::c(degrees as f64 * PI / 180.0);
         let turn = |angle: S| {
             let (s, c) = angle.sin_cos();
@@ -161,7 +162,7 @@ impl<S: Real> Family<S> {
         let mut ridges =
             Ridges { first: center, step: -(two * step), sigma: S::c(sigma), parts: yarn.weights.map(S::c) };
         let (mut total, mut weight, mut all) = (S::c(1e-9), S::zero(), S::c(1e-9));
-        for k in 0..TANGENTS {
+        for k in 0..if samples { TANGENTS } else { 0 } {
             let (sin, cos) = (radians(yarn.lo) + step * S::c(k as f64)).sin_cos();
             let seen = (cos * wo.z - sin * wo.x).max(S::c(0.05));
             // Steep threads, at 45° and more, have their cone about the normal: it is no ridge along this family.
@@ -247,11 +248,16 @@ fn across<R: Real>(w: V3<R>) -> V3<R> {
 
 impl<S: Real> Cloth<S> {
     pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        Self::prepare(yarns, wo, curve, true)
+    }
+
+    fn prepare(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>, samples: bool) -> Self {
         let total = (yarns[0].cover as f64 + yarns[1].cover as f64).max(1.0);
         let covered = (yarns[0].cover + yarns[1].cover).max(1e-6);
         let sampled = |i: usize| (yarns[i].cover / covered) as f64;
         let share = |i: usize| Yarn { cover: (yarns[i].cover as f64 / total) as f32, ..yarns[i] };
-        let families = [Family::new(&share(0), sampled(0), wo), Family::new(&share(1), sampled(1), across(wo))];
+        let families =
+            [Family::new(&share(0), sampled(0), wo, samples), Family::new(&share(1), sampled(1), across(wo), samples)];
         let gap = (S::one() - families[0].cover - families[1].cover).max(S::zero());
         let one = S::one();
         let mut cloth = Cloth { families, wo, scale: one, gap, excess: [one; 3] };
@@ -334,6 +340,7 @@ impl<S: Real> Cloth<S> {
         V3::new(choose(warp.x, -weft.y, even.x), choose(warp.y, weft.x, even.y), choose(warp.z, weft.z, even.z))
     }
 
+    /// Where f is divided, an upper estimate: by the excess at `w` alone.
     pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         let bound = Self::bounds(w, curve);
         let e = if curve.fibre().is_empty() { bound } else { curve.fibre().view(w, S::zero()) };
@@ -371,7 +378,7 @@ pub fn table(kernel: FibreKernel, key: FibreKey, yarns: &[Yarn; 2]) -> TableSpec
 /// The components of f for many ωi, before any division.
 pub fn integrate(yarns: &[Yarn; 2], wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
     // Eight at a time in single precision: these sums are what baking a cloth spends its time on.
-    let cloth = Cloth::<f32>::new(yarns, wo.map(|x| x as f32), &AlbedoCurve::default());
+    let cloth = Cloth::<f32>::prepare(yarns, wo.map(|x| x as f32), &AlbedoCurve::default(), false);
     for (out, wi) in out.chunks_mut(8).zip(wi.chunks(8)) {
         let lanes = |pick: fn(V3<f64>) -> f64| F32x8(std::array::from_fn(|k| pick(wi[k.min(wi.len() - 1)]) as f32));
         let parts = cloth.parts(V3::new(lanes(|w| w.x), lanes(|w| w.y), lanes(|w| w.z)));

@@ -113,6 +113,7 @@ impl<S: Real> Lobe<S> for Microcylinder<S> {
         self.cloth.sample(u)
     }
 
+    /// Exact where f is not divided, as for most presets; where it is, an upper estimate, as for `thread`.
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         self.cloth.albedo(w, curve)
     }

@@ -226,6 +226,8 @@ impl<S: Real> Lobe<S> for Thread<S> {
         V3::new(pick(ridge.x, even.x), pick(ridge.y, even.y), pick(ridge.z, even.z))
     }
 
+    /// Exact where f is not divided. Where it is, an upper estimate: E before the division over the excess at `w` alone,
+    /// though each f is divided by the larger excess of its two directions.
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         let e = if curve.fibre().is_empty() { self.bounds(w, curve) } else { curve.fibre().view(w, self.place) };
         let bound = self.bounds(w, curve);
