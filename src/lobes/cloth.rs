@@ -361,6 +361,7 @@ pub fn table(kernel: FibreKernel, key: FibreKey, yarns: &[Yarn; 2]) -> TableSpec
         let flat = y.lo == 0.0 && y.hi == 0.0;
         flat || y.lo == -y.hi && (0..TANGENTS).all(|i| (y.weights[i] - y.weights[TANGENTS - 1 - i]).abs() < 1e-9)
     };
+    let mirrored = yarns.iter().all(symmetric);
     TableSpec::Fibre(FibreSpec {
         kernel,
         key,
@@ -368,10 +369,11 @@ pub fn table(kernel: FibreKernel, key: FibreKey, yarns: &[Yarn; 2]) -> TableSpec
         axis: None,
         width: width.max(0.12),
         around: true,
-        detail: 0.7,
-        // Every tangent has a horizon of its own.
-        margin: 4e-3,
-        mirrored: yarns.iter().all(symmetric),
+        // Two sheets in the time of one: threads that stand out of the cloth reflect smoothly.
+        detail: if mirrored { 0.7 } else { 0.55 },
+        // Every tangent has a horizon of its own: the quadrature differs from one twice as fine by up to 0.8 %.
+        margin: 1e-2,
+        mirrored,
     })
 }
 
