@@ -128,8 +128,8 @@ impl<S: Real> Ridges<S> {
 #[derive(Clone, Copy, Debug)]
 struct Family<S> {
     cylinder: Cylinder<S>,
-    /// Cosine and sine of the first offset and of the step between offsets.
-    first: (S, S),
+    /// Cosine and sine of the middle offset and of the step between offsets.
+    middle: (S, S),
     step: (S, S),
     weights: &'static [f64; TANGENTS],
     cover: S,
@@ -181,7 +181,7 @@ impl<S: Real> Family<S> {
                 S::from_f32(yarn.gamma_v),
                 spread,
             ),
-            first: turn(radians(yarn.lo)),
+            middle: turn(S::c((yarn.lo as f64 + yarn.hi as f64) * PI / 360.0)),
             step: turn(step),
             weights: yarn.weights,
             cover: S::from_f32(yarn.cover),
@@ -195,13 +195,19 @@ impl<S: Real> Family<S> {
     /// Adds Σ a·S·M to the surface and volume sums, and Σ a·z⁺ of ωi to `q`.
     #[inline(always)]
     fn add<L: Real + Lift<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
-        let (mut cos, mut sin) = (L::lift(self.first.0), L::lift(self.first.1));
-        let (step_cos, step_sin) = (L::lift(self.step.0), L::lift(self.step.1));
+        // From the middle outward, so that no rounding tilts a tangent that lies flat.
+        let (mid_cos, mid_sin) = (L::lift(self.middle.0), L::lift(self.middle.1));
+        let (one_cos, one_sin) = (L::lift(self.step.0), L::lift(self.step.1));
+        let (two_cos, two_sin) = (one_cos * one_cos - one_sin * one_sin, L::c(2.0) * one_sin * one_cos);
+        let turn = |c: L, s: L| (mid_cos * c - mid_sin * s, mid_sin * c + mid_cos * s);
+        let middle = (mid_cos, mid_sin);
+        let tangents =
+            [turn(two_cos, -two_sin), turn(one_cos, -one_sin), middle, turn(one_cos, one_sin), turn(two_cos, two_sin)];
         let (zero, kd) = (L::zero(), L::lift(self.kd));
         // The tangent at this offset becomes x, its normal z.
         // A flat family has one tangent.
         let count = if self.weights[1..].iter().all(|w| *w == 0.0) { 1 } else { TANGENTS };
-        for weight in &self.weights[..count] {
+        for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
             let turned = |w: V3<L>| V3::new(cos * w.x + sin * w.z, w.y, cos * w.z - sin * w.x);
             let (lo, li) = (turned(wo), turned(wi));
             let (o, i) = (Around::new(lo), Around::new(li));
@@ -214,7 +220,6 @@ impl<S: Real> Family<S> {
             let Parts { surface: s, forward, even } = self.cylinder.parts(o, i);
             *surface += seen * s;
             *volume += seen * kd.mul_add(even - forward, forward);
-            (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
         }
     }
 }
