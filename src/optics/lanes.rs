@@ -64,6 +64,10 @@ impl Real for f64 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
+    #[inline(always)]
+    fn turned(self, a: f64, o: Self, b: f64) -> Self {
+        self * a + o * b
+    }
     fn exp(self) -> Self {
         f64::exp(self)
     }
@@ -85,6 +89,10 @@ impl Real for f32 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         // Not `f32::mul_add`: without the instruction it is a slow library call, and the lanes must agree bit for bit.
         self * a + b
+    }
+    #[inline(always)]
+    fn turned(self, a: f64, o: Self, b: f64) -> Self {
+        (f64::from(self) * a + f64::from(o) * b) as f32
     }
     #[inline(always)]
     fn exp(self) -> Self {
@@ -247,6 +255,10 @@ impl Real for F32x8 {
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
+    }
+    #[inline(always)]
+    fn turned(self, a: f64, o: Self, b: f64) -> Self {
+        self.zip(o, |x, y| x.turned(a, y, b))
     }
     #[inline(always)]
     fn exp(self) -> Self {

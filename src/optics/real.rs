@@ -47,6 +47,8 @@ pub trait Real:
     fn floor(self) -> Self;
     /// `self·a + b`, fused where the machine fuses.
     fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `self·a + o·b` with double-precision constants, rounded once: keeps its digits where the two products cancel.
+    fn turned(self, a: f64, o: Self, b: f64) -> Self;
     /// eˣ; 0 below the range of the type, +∞ above it.
     fn exp(self) -> Self;
     /// Natural logarithm of a positive number; of 0 or less: a large negative finite number.
