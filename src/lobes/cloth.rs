@@ -128,9 +128,10 @@ impl<S: Real> Ridges<S> {
 #[derive(Clone, Copy, Debug)]
 struct Family<S> {
     cylinder: Cylinder<S>,
-    /// Cosine and sine of the middle offset and of the step between offsets.
-    middle: (S, S),
-    step: (S, S),
+    /// Cosine and sine of the middle offset and of the step between offsets, in double precision: what turning by them
+    /// leaves of a direction near a tangent plane is a small difference.
+    middle: (f64, f64),
+    step: (f64, f64),
     weights: &'static [f64; TANGENTS],
     cover: S,
     kd: S,
@@ -144,8 +145,8 @@ impl<S: Real> Family<S> {
     /// `samples`: whether it is ever sampled; integrating needs no proposal.
     fn new(yarn: &Yarn, share: f64, wo: V3<S>, samples: bool) -> Self {
         let radians = |degrees: f32| S::c(degrees as f64 * PI / 180.0);
-        let turn = |angle: S| {
-            let (s, c) = angle.sin_cos();
+        let turn = |degrees: f64| {
+            let (s, c) = degrees.to_radians().sin_cos();
             (c, s)
         };
         let range = yarn.hi as f64 - yarn.lo as f64;
@@ -181,8 +182,8 @@ impl<S: Real> Family<S> {
                 S::from_f32(yarn.gamma_v),
                 spread,
             ),
-            middle: turn(S::c((yarn.lo as f64 + yarn.hi as f64) * PI / 360.0)),
-            step: turn(step),
+            middle: turn((yarn.lo as f64 + yarn.hi as f64) / 2.0),
+            step: turn(range / (TANGENTS - 1) as f64),
             weights: yarn.weights,
             cover: S::from_f32(yarn.cover),
             kd: S::from_f32(yarn.kd),
@@ -196,19 +197,22 @@ impl<S: Real> Family<S> {
     #[inline(always)]
     fn add<L: Real + Lift<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
         // From the middle outward, so that no rounding tilts a tangent that lies flat.
-        let (mid_cos, mid_sin) = (L::lift(self.middle.0), L::lift(self.middle.1));
-        let (one_cos, one_sin) = (L::lift(self.step.0), L::lift(self.step.1));
-        let (two_cos, two_sin) = (one_cos * one_cos - one_sin * one_sin, L::c(2.0) * one_sin * one_cos);
-        let turn = |c: L, s: L| (mid_cos * c - mid_sin * s, mid_sin * c + mid_cos * s);
-        let middle = (mid_cos, mid_sin);
-        let tangents =
-            [turn(two_cos, -two_sin), turn(one_cos, -one_sin), middle, turn(one_cos, one_sin), turn(two_cos, two_sin)];
+        let ((mid_cos, mid_sin), (one_cos, one_sin)) = (self.middle, self.step);
+        let (two_cos, two_sin) = (one_cos * one_cos - one_sin * one_sin, 2.0 * one_sin * one_cos);
+        let turn = |c: f64, s: f64| (mid_cos * c - mid_sin * s, mid_sin * c + mid_cos * s);
+        let tangents = [
+            turn(two_cos, -two_sin),
+            turn(one_cos, -one_sin),
+            self.middle,
+            turn(one_cos, one_sin),
+            turn(two_cos, two_sin),
+        ];
         let (zero, kd) = (L::zero(), L::lift(self.kd));
         // The tangent at this offset becomes x, its normal z.
         // A flat family has one tangent.
         let count = if self.weights[1..].iter().all(|w| *w == 0.0) { 1 } else { TANGENTS };
         for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
-            let turned = |w: V3<L>| V3::new(cos * w.x + sin * w.z, w.y, cos * w.z - sin * w.x);
+            let turned = |w: V3<L>| V3::new(w.x.turned(cos, w.z, sin), w.y, w.z.turned(cos, w.x, -sin));
             let (lo, li) = (turned(wo), turned(wi));
             let (o, i) = (Around::new(lo), Around::new(li));
             let area = L::lift(self.cover) * L::c(*weight);
