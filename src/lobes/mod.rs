@@ -26,7 +26,7 @@ pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
-use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
+use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
 /// A value per colour channel.
 pub type Rgb<R> = [R; 3];
@@ -205,26 +205,8 @@ impl LobeKind {
 const LAYER: Form = Form {
     name: "layer",
     params: &[
-        ParamSpec {
-            name: "top",
-            ty: ParamTy::Closure,
-            keyword: false,
-            default: &[],
-            min: f32::NEG_INFINITY,
-            max: f32::INFINITY,
-            options: &[],
-            doc: "What light meets first.",
-        },
-        ParamSpec {
-            name: "base",
-            ty: ParamTy::Closure,
-            keyword: false,
-            default: &[],
-            min: f32::NEG_INFINITY,
-            max: f32::INFINITY,
-            options: &[],
-            doc: "What lies below; scaled by what the top passes on.",
-        },
+        ParamSpec::closure("top", "What light meets first."),
+        ParamSpec::closure("base", "What lies below; scaled by what the top passes on."),
     ],
     doc: "`top` over `base`: the base is scaled by min(α(ωo), α(ωi)), α = 1 − the albedo bound of the top.",
     source: "Conty & Kulla 2017, §5, after Kelemen & Szirmay-Kalos 2001",

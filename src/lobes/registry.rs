@@ -73,6 +73,20 @@ pub struct ParamSpec {
 }
 
 impl ParamSpec {
+    /// A `closure color` parameter, of a form that wraps or layers.
+    pub const fn closure(name: &'static str, doc: &'static str) -> ParamSpec {
+        ParamSpec {
+            name,
+            ty: ParamTy::Closure,
+            keyword: false,
+            default: &[],
+            min: f32::NEG_INFINITY,
+            max: f32::INFINITY,
+            options: &[],
+            doc,
+        }
+    }
+
     /// A slot value as lobes read it: clamped to the declared range, whole where the type is; NaN becomes the default
     /// (or the lower end without one).
     pub fn clamp(&self, slot: usize, value: f32) -> f32 {

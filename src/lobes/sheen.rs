@@ -28,7 +28,7 @@
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
-use super::registry::{Build, ClosureParams, Form, ParamSpec, ParamTy, SlotSource, closure};
+use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::{Lift, Real, V3};
@@ -60,16 +60,7 @@ closure! {
     class: Scatter,
 }
 
-const BASE: ParamSpec = ParamSpec {
-    name: "base",
-    ty: ParamTy::Closure,
-    keyword: false,
-    default: &[],
-    min: f32::NEG_INFINITY,
-    max: f32::INFINITY,
-    options: &[],
-    doc: "What the sheen lies over.",
-};
+const BASE: ParamSpec = ParamSpec::closure("base", "What the sheen lies over.");
 const TINT: ParamSpec = ParamSpec { name: "tint", doc: "Color of the sheen.", ..SheenParams::SPEC.params[1] };
 
 /// `sheen(Ci, N, tint, roughness)`, which wraps, and `sheen(N, roughness)`, the bare lobe.
