@@ -47,7 +47,7 @@ pub fn furnace(bench: &Bench<'_>) -> Result<Figure, Failure> {
         says: "reflected energy grows with roughness without normalisation, and is consistent with it.",
         measured: format!(
             "facing, {:.2} to {:.2} before and {:.2} to {:.2} after; the constant includes the cosine, which the talk's \
-             leaves out (with that one only 0.53 to 0.63 would be reflected).",
+             leaves out.",
             before.0, before.1, after.0, after.1
         ),
         files: bench.plot("fabric-2-furnace", &plot)?,
