@@ -6,9 +6,10 @@
 
 use crate::Globals;
 use crate::albedo::Precision;
-use crate::closure::{Bsdf, ClosureTree, Curves, Layering, LayeringRule, TintRule, flatten};
+use crate::closure::balance::Construction;
+use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
 use crate::diag::{Diagnostic, render_all};
-use crate::ir::{self, CheckedShader, ParamDecl, Program, Site, Value};
+use crate::ir::{self, CheckedShader, GlobalVar, ParamDecl, Program, Value};
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use glam::Vec3;
@@ -136,18 +137,18 @@ impl Shader {
 
     fn finished(&self, program: Program) -> Material {
         let start = Instant::now();
-        let curves = bake(program.sites(), self.engine.tier.precision());
+        let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
         let inner = Inner {
             engine: self.engine,
             name: self.name().to_owned(),
             program,
-            curves,
+            tables,
             baked_in: start.elapsed(),
             reference: OnceLock::new(),
         };
         let material = Material { inner: Arc::new(inner) };
         if self.engine.tier == Tier::Reference {
-            material.reference_curves();
+            material.reference_tables();
         }
         material
     }
@@ -164,9 +165,9 @@ struct Inner {
     engine: Engine,
     name: String,
     program: Program,
-    curves: Curves<f32>,
+    tables: Baked<f32>,
     baked_in: Duration,
-    reference: OnceLock<Curves<f64>>,
+    reference: OnceLock<Baked<f64>>,
 }
 
 impl Material {
@@ -205,7 +206,7 @@ impl Material {
     /// # Errors
     /// If the closure tree goes beyond a budget.
     pub fn shade(&self, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
-        self.flattened(globals, V3::from_f32(wo.to_array()), &self.inner.curves)
+        self.flattened(globals, V3::from_f32(wo.to_array()), &self.inner.tables)
     }
 
     /// [`shade`](Self::shade) in double precision, with the reference tier's albedos. They are baked on the first call
@@ -214,23 +215,30 @@ impl Material {
     /// # Errors
     /// If the closure tree goes beyond a budget.
     pub fn shade_reference(&self, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'_, f64>, ShadeError> {
-        self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_curves())
+        self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_tables())
     }
 
     fn flattened<'m, S: Scalar>(
         &'m self,
         globals: &Globals,
         wo: V3<S>,
-        curves: &'m Curves<S>,
+        tables: &'m Baked<S>,
     ) -> Result<Bsdf<'m, S>, ShadeError> {
         let i = wo.map(|x| -x.to_f32());
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
         let tree = self.tree(&globals)?;
-        flatten(&tree, &globals, wo, self.inner.engine.layering, curves)
+        let tables = Tables { curves: &tables.curves, balance: tables.balance.as_ref() };
+        flatten(&tree, &globals, wo, self.inner.engine.layering, tables)
     }
 
-    fn reference_curves(&self) -> &Curves<f64> {
-        self.inner.reference.get_or_init(|| bake(self.inner.program.sites(), Precision::REFERENCE))
+    fn reference_tables(&self) -> &Baked<f64> {
+        let bake = || Baked::new(&self.inner.program, self.inner.engine.layering, Precision::REFERENCE);
+        self.inner.reference.get_or_init(bake)
+    }
+
+    /// The scales solved for the `balanced` rule; `None` under other rules.
+    pub fn balance(&self) -> Option<&Balance<f32>> {
+        self.inner.tables.balance.as_ref()
     }
 
     /// How long baking the albedo tables took.
@@ -240,16 +248,55 @@ impl Material {
 
     /// Memory the albedo tables take.
     pub fn table_bytes(&self) -> usize {
-        self.inner.curves.bytes() + self.inner.reference.get().map_or(0, Curves::bytes)
+        self.inner.tables.bytes() + self.inner.reference.get().map_or(0, Baked::bytes)
     }
 }
 
-fn bake<S: Scalar>(sites: &[Site], precision: Precision) -> Curves<S> {
-    let mut curves = Curves::default();
-    for (index, site) in sites.iter().enumerate() {
-        curves.set(index as u32, site.kind.table(&site.values), precision);
+/// What is computed once per material.
+#[derive(Debug)]
+struct Baked<S: Scalar> {
+    curves: Curves<S>,
+    balance: Option<Balance<S>>,
+}
+
+impl<S: Scalar> Baked<S> {
+    fn new(program: &Program, layering: Layering, precision: Precision) -> Self {
+        let mut curves = Curves::default();
+        for (index, site) in program.sites().iter().enumerate() {
+            curves.set(index as u32, site.kind.table(&site.values), precision);
+        }
+        let balanced = layering.rule == LayeringRule::Balanced;
+        let balance = balanced.then(|| balance(program, layering.tint, &curves, precision));
+        Baked { curves, balance }
     }
-    curves
+
+    fn bytes(&self) -> usize {
+        self.curves.bytes() + self.balance.as_ref().map_or(0, Balance::bytes)
+    }
+}
+
+/// Solves for the scales of the `balanced` rule.
+fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, precision: Precision) -> Balance<S> {
+    let mut balancer = Balancer::new(precision);
+    if program.is_constant() {
+        // Normals are told apart by the global they come from, so none may coincide here.
+        let globals = Globals {
+            n: Vec3::new(0.13, -0.21, 0.97),
+            ng: Vec3::new(-0.31, 0.17, 0.94),
+            dpdu: Vec3::new(0.91, 0.37, 0.19),
+            dpdv: Vec3::new(-0.41, 0.88, 0.23),
+            ..Globals::default()
+        };
+        let mut tree = ClosureTree::new();
+        // A tree beyond a budget is black here, and an error wherever it is shaded.
+        let _ = program.shade(&globals, &mut tree);
+        return balancer.solve(&tree, &globals, tint, curves);
+    }
+    // Where the view changes the tree no scale is symmetric.
+    let pairs = if program.globals().contains(&GlobalVar::I) { vec![] } else { program.layer_pairs() };
+    let sites = program.sites();
+    let sites: Vec<_> = sites.iter().map(|s| Construction { kind: s.kind, values: &s.values }).collect();
+    balancer.solve_pairs(&sites, &pairs, tint, curves)
 }
 
 /// What is wrong with a script.

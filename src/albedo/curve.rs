@@ -69,15 +69,20 @@ pub struct Precision {
     pub azimuth: usize,
     /// What the bound is lifted by in any case: the quadrature's error and the rounding of the evaluating type.
     pub margin: f64,
+    /// Nodes over the cosine of a balanced layer's scale.
+    pub scale_nodes: usize,
 }
 
 impl Precision {
     /// Within 1e-3 of the quadrature (2e-3 where a parameter varies).
-    pub const STANDARD: Precision = Precision { cos_nodes: 160, axis_nodes: 32, polar: 32, azimuth: 24, margin: 1e-5 };
+    pub const STANDARD: Precision =
+        Precision { cos_nodes: 160, axis_nodes: 32, polar: 32, azimuth: 24, margin: 1e-5, scale_nodes: 96 };
     /// Within 1e-2 of the quadrature, in a fifth of the memory.
-    pub const FAST: Precision = Precision { cos_nodes: 48, axis_nodes: 16, polar: 24, azimuth: 16, margin: 1e-4 };
+    pub const FAST: Precision =
+        Precision { cos_nodes: 48, axis_nodes: 16, polar: 24, azimuth: 16, margin: 1e-4, scale_nodes: 40 };
     /// Interpolation below 5e-6.
-    pub const REFERENCE: Precision = Precision { cos_nodes: 512, axis_nodes: 96, polar: 64, azimuth: 48, margin: 2e-6 };
+    pub const REFERENCE: Precision =
+        Precision { cos_nodes: 512, axis_nodes: 96, polar: 64, azimuth: 48, margin: 2e-6, scale_nodes: 160 };
 }
 
 /// E_view and a bound over μ, and over the varying parameter if there is one.
@@ -341,7 +346,7 @@ impl Quadrature {
 }
 
 /// Maps over `items` on all cores, in order.
-pub(super) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub(crate) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let chunk = items.len().div_ceil(threads).max(16);
     let f = &f;

@@ -20,6 +20,7 @@ impl Global {
         };
         let rule = match self.layering {
             LayeringArg::Min => LayeringRule::Min,
+            LayeringArg::Balanced => LayeringRule::Balanced,
             LayeringArg::View => LayeringRule::View,
         };
         let tint = match self.tint_rule {

@@ -60,6 +60,8 @@ enum TierArg {
 enum LayeringArg {
     /// min(α(ωo), α(ωi)): reciprocal, never gains.
     Min,
+    /// s(ωo)·s(ωi), solved per lobe: reciprocal, lossless below reciprocal tops.
+    Balanced,
     /// 1 − E(ωo): loses nothing toward the camera, not reciprocal.
     View,
 }

@@ -3,6 +3,7 @@
 //! Directions are unit vectors in world space that point away from the surface. Each lobe uses the cosine of its own
 //! normal; nothing is clipped at the geometric normal.
 
+use super::balance::Balanced;
 use super::flatten::Layering;
 use super::layer::{LayerStack, LayeringRule};
 use super::tree::MAX_LAYERS;
@@ -63,6 +64,8 @@ pub(crate) struct FlatLobe<'m, S: Real> {
     pub delta: bool,
     /// What it is estimated to scatter for this ωo, weights and layers included.
     pub albedo: Rgb<S>,
+    /// What scales it in place of the layers' own rule, if that was solved for.
+    pub balanced: Option<Balanced<'m, S>>,
     /// Of being chosen by `sample`.
     pub probability: S,
 }
@@ -432,7 +435,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                         frame = l.frame;
                         local = self.frames[frame as usize].to_local(wi);
                     }
-                    visit(lobe, l, stack.scale(), local);
+                    let scale = match &l.balanced {
+                        Some(balanced) => balanced.scale(local.z),
+                        None => stack.scale(),
+                    };
+                    visit(lobe, l, scale, local);
                     lobe += 1;
                     if l.in_top || bound {
                         stack.lobe(l.weight_in_top, l.lobe.albedo_bound(local, l.curve));
@@ -452,7 +459,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// Whether every layer scales symmetrically in its directions.
     pub fn symmetric_layers(&self) -> bool {
-        self.layers.is_empty() || self.layering.rule == LayeringRule::Min
+        self.layers.is_empty() || self.layering.rule != LayeringRule::View
     }
 }
 

@@ -3,14 +3,16 @@
 //! One pass, top before base, over an explicit stack. Every lobe is prepared once; lobes that share a normal and a
 //! tangent share a frame.
 
+use super::balance::{Balance, Chain};
 use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
 use super::layer::{LayerStack, LayeringRule, TintRule};
-use super::tree::{ClosureTree, MAX_LAYERS, Node, NodeId, TreeError};
+use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
+use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{Frame, Scalar, V3, frame};
+use crate::optics::{Scalar, V3, frame};
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -55,7 +57,7 @@ impl<S: Scalar> Curves<S> {
         self.baked.iter().map(|(_, c)| c.bytes()).sum()
     }
 
-    fn of(&self, site: u32) -> &AlbedoCurve<S> {
+    pub(super) fn of(&self, site: u32) -> &AlbedoCurve<S> {
         match self.sites.get(site as usize) {
             Some(Some(index)) => &self.baked[*index as usize].1,
             _ => &self.none,
@@ -72,21 +74,19 @@ pub struct Layering {
     pub tint: TintRule,
 }
 
-/// Weights along the way from the root to a node.
-#[derive(Clone, Copy)]
-struct Weights<S> {
-    /// From the root.
-    total: Rgb<S>,
-    /// From the root of the innermost top the node stands in.
-    in_top: Rgb<S>,
-    /// Whether it stands in a top at all.
-    inside: bool,
+/// The tables of a material that flattening reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables<'m, S: Scalar> {
+    /// Albedos by site.
+    pub curves: &'m Curves<S>,
+    /// Solved scales for [`LayeringRule::Balanced`]; without them that rule is [`LayeringRule::Min`].
+    pub balance: Option<&'m Balance<S>>,
 }
 
-enum Step<S> {
-    Visit(NodeId, Weights<S>),
-    Middle(Weights<S>),
-    End,
+impl<'m, S: Scalar> From<&'m Curves<S>> for Tables<'m, S> {
+    fn from(curves: &'m Curves<S>) -> Self {
+        Tables { curves, balance: None }
+    }
 }
 
 /// Builds the BSDF of `tree` for the direction `wo` (world space; any length).
@@ -98,7 +98,7 @@ pub fn flatten<'m, S: Scalar>(
     globals: &Globals,
     wo: V3<S>,
     layering: Layering,
-    curves: &'m Curves<S>,
+    tables: impl Into<Tables<'m, S>>,
 ) -> Result<Bsdf<'m, S>, TreeError> {
     tree.within_budget()?;
     let layers = tree.size(tree.root()).layers;
@@ -106,75 +106,88 @@ pub fn flatten<'m, S: Scalar>(
     let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
     // Written in place: a BSDF with room for eight lobes is too large to pass around.
     let mut bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
+    let tables = tables.into();
     match layers {
-        0..=4 => Flattener::<S, 4>::new(tree, globals, curves, &mut bsdf).walk(),
-        _ => Flattener::<S, { MAX_LAYERS as usize }>::new(tree, globals, curves, &mut bsdf).walk(),
+        0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, &mut bsdf)),
+        _ => walk(tree, &mut Flattener::<S, { MAX_LAYERS as usize }>::new(globals, tables, &mut bsdf)),
     }
     bsdf.finish();
     Ok(bsdf)
 }
 
-struct Flattener<'t, 'b, 'm, S: Scalar, const D: usize> {
-    tree: &'t ClosureTree,
-    globals: &'t Globals,
+struct Flattener<'b, 'm, S: Scalar, const D: usize> {
+    globals: &'b Globals,
     curves: &'m Curves<S>,
+    balance: Option<&'m Balance<S>>,
     bsdf: &'b mut Bsdf<'m, S>,
     /// The walk for ωo, made while flattening.
     stack: LayerStack<S, D>,
+    /// What lies above, for balancing.
+    chain: Chain<S>,
+    /// Lobes met so far, whether they count or not.
+    met: usize,
     /// Normal and tangent as the tree gave them, per frame.
     frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
 }
 
-impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
-    fn new(tree: &'t ClosureTree, globals: &'t Globals, curves: &'m Curves<S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
-        Flattener { tree, globals, curves, bsdf, stack: LayerStack::default(), frame_keys: SmallVec::new() }
+impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
+    fn new(globals: &'b Globals, tables: Tables<'m, S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
+        let balance = tables.balance.filter(|_| bsdf.layering.rule == LayeringRule::Balanced);
+        let (stack, chain) = (LayerStack::default(), Chain::default());
+        let frame_keys = SmallVec::new();
+        Flattener { globals, curves: tables.curves, balance, bsdf, stack, chain, met: 0, frame_keys }
     }
 
-    fn walk(&mut self) {
-        let one = [S::one(); 3];
-        let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
-        steps.push(Step::Visit(self.tree.root(), Weights { total: one, in_top: one, inside: false }));
-        while let Some(step) = steps.pop() {
-            match step {
-                Step::Visit(id, w) => match self.tree.node(id) {
-                    Node::Zero => {}
-                    Node::Add(a, b) => {
-                        steps.push(Step::Visit(b, w));
-                        steps.push(Step::Visit(a, w));
-                    }
-                    Node::Mul(weight, c) => steps.push(Step::Visit(c, w.times(weight.map(S::from_f32)))),
-                    Node::Layer { top, base } => {
-                        steps.push(Step::End);
-                        steps.push(Step::Visit(base, w));
-                        steps.push(Step::Middle(w));
-                        steps.push(Step::Visit(top, Weights { in_top: one, inside: true, ..w }));
-                        self.stack.begin();
-                        self.bsdf.ops.push(Op::Begin);
-                    }
-                    Node::Lobe { kind, site, slots } => self.lobe(kind, site, slots, w),
-                },
-                Step::Middle(w) => {
-                    let Layering { rule, tint } = self.bsdf.layering;
-                    let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
-                    self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
-                    self.bsdf.ops.push(Op::Middle);
-                }
-                Step::End => {
-                    self.stack.end();
-                    self.bsdf.ops.push(Op::End);
-                }
-            }
+    fn chained(&mut self, f: impl FnOnce(&mut Chain<S>)) {
+        if self.balance.is_some_and(Balance::needs_chain) {
+            f(&mut self.chain);
         }
     }
 
-    fn lobe(&mut self, kind: LobeKind, site: u32, slots: u32, w: Weights<S>) {
-        let values = self.tree.values(kind, slots);
-        let w = w.times(kind.weight(values).map(S::from_f32));
+    /// The frame of a lobe.
+    fn frame(&mut self, kind: LobeKind, values: &[f32]) -> u32 {
+        let (n, t) = directions(kind, values, self.globals);
+        let same = |a: Vec3, b: Vec3| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits);
+        if let Some(i) = self.frame_keys.iter().position(|k| same(k.0, n) && same(k.1, t)) {
+            return i as u32;
+        }
+        self.frame_keys.push((n, t));
+        self.bsdf.frames.push(walk::frame((n, t), self.globals));
+        self.frame_keys.len() as u32 - 1
+    }
+}
+
+impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
+    fn begin(&mut self) {
+        self.stack.begin();
+        self.chained(Chain::begin);
+        self.bsdf.ops.push(Op::Begin);
+    }
+
+    fn middle(&mut self, w: Weights<S>) {
+        let Layering { rule, tint } = self.bsdf.layering;
+        let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
+        self.chained(Chain::middle);
+        self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
+        self.bsdf.ops.push(Op::Middle);
+    }
+
+    fn end(&mut self) {
+        self.stack.end();
+        self.chained(Chain::end);
+        self.bsdf.ops.push(Op::End);
+    }
+
+    fn lobe(&mut self, visit: LobeVisit<'_, S>) {
+        let LobeVisit { kind, site, values, weights: w } = visit;
+        let met = self.met;
+        self.met += 1;
         if w.total.iter().all(|w| *w <= S::zero()) && !w.inside {
             return;
         }
         let frame = self.frame(kind, values);
         let curve = self.curves.of(site);
+        let normal = self.bsdf.frames[frame as usize].n;
         let wo = self.bsdf.frames[frame as usize].to_local(self.bsdf.wo);
         let lobe = AnyLobe::new(kind, values, wo, curve);
         let scale = self.stack.scale();
@@ -187,9 +200,11 @@ impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
         let albedo = lobe.albedo(wo, curve);
         let share: Rgb<S> = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums estimates in place of bounds.
-        match self.bsdf.layering.rule {
-            LayeringRule::View => self.stack.lobe(w.in_top, albedo),
-            LayeringRule::Min => self.stack.lobe(w.in_top, lobe.albedo_bound(wo, curve)),
+        let view = self.bsdf.layering.rule == LayeringRule::View;
+        self.stack.lobe(w.in_top, if view { albedo } else { lobe.albedo_bound(wo, curve) });
+        let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
+        if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
+            self.chained(|chain| chain.lobe(&visit, normal, param));
         }
         self.bsdf.lobes.push(FlatLobe {
             lobe,
@@ -200,38 +215,12 @@ impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
             cos_o: wo.z.abs().min(S::one()),
             weight: w.total,
             weight_in_top: w.in_top,
-            in_top: w.inside && self.bsdf.layering.rule == LayeringRule::Min,
+            in_top: w.inside && !view,
             delta: kind.class() == LobeClass::Delta,
             albedo: share,
+            balanced,
             probability: S::zero(),
         });
         self.bsdf.ops.push(Op::Lobe);
-    }
-
-    /// The frame of a lobe: its own normal and tangent, or the shading point's.
-    fn frame(&mut self, kind: LobeKind, values: &[f32]) -> u32 {
-        let spec = kind.spec();
-        let vector = |slot: Option<usize>, default: Vec3| {
-            slot.and_then(|s| values.get(s..s + 3)).map_or(default, Vec3::from_slice)
-        };
-        let g = self.globals;
-        let (n, t) = (vector(spec.normal_slot(), g.n), vector(spec.tangent_slot(), g.dpdu));
-        let same = |a: Vec3, b: Vec3| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits);
-        if let Some(i) = self.frame_keys.iter().position(|k| same(k.0, n) && same(k.1, t)) {
-            return i as u32;
-        }
-        let v = |v: Vec3| V3::from_f32(v.to_array());
-        self.frame_keys.push((n, t));
-        self.bsdf.frames.push(Frame::new(v(n), v(g.ng), v(t), v(g.dpdu)));
-        self.frame_keys.len() as u32 - 1
-    }
-}
-
-impl<S: Scalar> Weights<S> {
-    /// Products of weights stay below the largest weight, as each of them does.
-    fn times(self, weight: Rgb<S>) -> Self {
-        let limit = S::c(super::tree::MAX_WEIGHT as f64);
-        let product = |a: Rgb<S>| std::array::from_fn(|c| (a[c] * weight[c]).min(limit));
-        Weights { total: product(self.total), in_top: product(self.in_top), inside: self.inside }
     }
 }

@@ -18,8 +18,16 @@ pub enum LayeringRule {
     /// min(α(ωo), α(ωi)): reciprocal, never gains; loses up to 15 % on a white base.
     #[default]
     Min,
+    /// s(ωo)·s(ωi), solved per base lobe so that its albedo becomes exactly α(ωo) times its own: reciprocal, and for
+    /// a reciprocal top lossless. Where that is not to be had, `Min`; see [`super::balance`].
+    Balanced,
     /// 1 − E(ωo): loses nothing seen from the camera; not reciprocal, gains seen from the light.
     View,
+}
+
+impl LayeringRule {
+    /// Every rule there is.
+    pub const ALL: [LayeringRule; 3] = [LayeringRule::Min, LayeringRule::Balanced, LayeringRule::View];
 }
 
 /// Which channels of a top's albedo a layer answers to.
@@ -46,7 +54,8 @@ pub fn alpha<L: Real>(tint: TintRule, bound: Rgb<L>) -> Rgb<L> {
 #[inline(always)]
 pub fn scale<L: Real>(rule: LayeringRule, alpha_o: Rgb<L>, alpha_i: Rgb<L>) -> Rgb<L> {
     match rule {
-        LayeringRule::Min => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
+        // What was solved for takes the place of this.
+        LayeringRule::Min | LayeringRule::Balanced => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
         LayeringRule::View => alpha_o,
     }
 }

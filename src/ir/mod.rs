@@ -10,6 +10,7 @@ mod builtins;
 mod check;
 mod lower;
 mod ops;
+mod pairs;
 mod passes;
 mod program;
 mod shader;

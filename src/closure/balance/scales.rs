@@ -1,0 +1,105 @@
+//! The table of a solved scale, and how evaluation reads it.
+
+use crate::lobes::Rgb;
+use crate::optics::{Lift, Real, Scalar};
+
+/// s over μ = x⁴ at uniform x, for a row per weight and parameter of the top.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Scales<S> {
+    /// One block per channel; in it a row of `nodes` values per weight, for every parameter.
+    pub values: Vec<S>,
+    pub nodes: usize,
+    /// 1 where they do not vary.
+    pub weights: usize,
+    pub params: usize,
+    /// 1 if all channels are alike, else 3.
+    pub channels: usize,
+    /// √ of the lowest parameter, and 1/(√hi − √lo).
+    pub lo: S,
+    pub inv_range: S,
+}
+
+/// Where between the rows of a table a point lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Row<S> {
+    first: u32,
+    weight: S,
+    param: S,
+}
+
+/// The weight at `x` in [0, 1] along the table: graded toward 1, where the top takes all and s changes fastest.
+pub(super) fn weight_at(x: f64) -> f64 {
+    1.0 - (1.0 - x).powi(2)
+}
+
+/// The cosine at `x` in [0, 1] along a row. The horizon itself, where a one-sided lobe is black, is approached only.
+pub(super) fn cosine_at(x: f64) -> f64 {
+    x.powi(4).max(1e-12)
+}
+
+impl<S: Scalar> Scales<S> {
+    /// The row for a top of weight `w`, its parameter at `p`; what does not vary is ignored.
+    pub fn row(&self, w: S, p: S) -> Row<S> {
+        let (i, weight) = cell(S::one() - (S::one() - w).safe_sqrt(), self.weights);
+        let (j, param) = cell((p.safe_sqrt() - self.lo) * self.inv_range, self.params);
+        Row { first: (j * self.weights + i) as u32, weight, param }
+    }
+
+    /// s at `cos`, per channel.
+    #[inline(always)]
+    pub fn read<L: Real + Lift<S>>(&self, row: Row<S>, cos: L) -> Rgb<L> {
+        let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * L::c((self.nodes - 1) as f64);
+        let i = x.floor().min(L::c((self.nodes - 2) as f64));
+        let t = x - i;
+        let along_row = |row: usize| {
+            let at = i + L::c((row * self.nodes) as f64);
+            let (a, b) = (L::gather(&self.values, at), L::gather(&self.values, at + L::one()));
+            (b - a).mul_add(t, a)
+        };
+        let over_weight = |first: usize| {
+            let a = along_row(first);
+            if self.weights == 1 { a } else { (along_row(first + 1) - a).mul_add(L::lift(row.weight), a) }
+        };
+        let channel = |c: usize| {
+            let first = c * self.weights * self.params + row.first as usize;
+            let a = over_weight(first);
+            if self.params == 1 { a } else { (over_weight(first + self.weights) - a).mul_add(L::lift(row.param), a) }
+        };
+        if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.values)
+    }
+}
+
+/// Cell and fraction for `x` in [0, 1] over `count` uniform nodes.
+fn cell<S: Scalar>(x: S, count: usize) -> (usize, S) {
+    if count < 2 {
+        return (0, S::zero());
+    }
+    let x = x.clamp(S::zero(), S::one()) * S::c((count - 1) as f64);
+    let i = x.floor().min(S::c((count - 2) as f64));
+    (i.to_f64() as usize, x - i)
+}
+
+/// The scale of one lobe, read for one ωo.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Balanced<'m, S> {
+    scales: &'m Scales<S>,
+    row: Row<S>,
+    toward_viewer: Rgb<S>,
+}
+
+impl<'m, S: Scalar> Balanced<'m, S> {
+    pub(super) fn new(scales: &'m Scales<S>, row: Row<S>, cos_o: S) -> Self {
+        Balanced { scales, row, toward_viewer: scales.read(row, cos_o) }
+    }
+
+    /// s(ωo)·s(ωi) for the cosine of ωi.
+    #[inline(always)]
+    pub fn scale<L: Real + Lift<S>>(&self, cos: L) -> Rgb<L> {
+        let s = self.scales.read(self.row, cos);
+        std::array::from_fn(|c| L::lift(self.toward_viewer[c]) * s[c])
+    }
+}

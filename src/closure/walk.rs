@@ -1,0 +1,106 @@
+//! A tree written out, top before base: the order that flattening and balancing share.
+//!
+//! A loop over an explicit stack, because trees may be deep. A node used twice is visited twice.
+
+use super::tree::{ClosureTree, MAX_WEIGHT, Node, NodeId};
+use crate::globals::Globals;
+use crate::lobes::{LobeKind, Rgb};
+use crate::optics::{Frame, Scalar, V3};
+use glam::Vec3;
+use smallvec::SmallVec;
+
+/// Weights along the way from the root to a node.
+#[derive(Clone, Copy)]
+pub(super) struct Weights<S> {
+    /// From the root.
+    pub total: Rgb<S>,
+    /// From the root of the innermost top the node stands in.
+    pub in_top: Rgb<S>,
+    /// Whether it stands in a top at all.
+    pub inside: bool,
+}
+
+impl<S: Scalar> Weights<S> {
+    /// Products of weights stay below the largest weight, as each of them does.
+    pub fn times(self, weight: Rgb<S>) -> Self {
+        let limit = S::c(MAX_WEIGHT as f64);
+        let product = |a: Rgb<S>| std::array::from_fn(|c| (a[c] * weight[c]).min(limit));
+        Weights { total: product(self.total), in_top: product(self.in_top), inside: self.inside }
+    }
+}
+
+/// A lobe on the way.
+#[derive(Clone, Copy)]
+pub(super) struct LobeVisit<'t, S> {
+    pub kind: LobeKind,
+    pub site: u32,
+    /// Its parameter block.
+    pub values: &'t [f32],
+    /// The lobe's own color included.
+    pub weights: Weights<S>,
+}
+
+/// What is done along the way.
+pub(super) trait Visitor<S> {
+    /// A layer begins, its top first.
+    fn begin(&mut self);
+    /// A lobe.
+    fn lobe(&mut self, lobe: LobeVisit<'_, S>);
+    /// The top is complete, the base follows; the weights are the layer's.
+    fn middle(&mut self, weights: Weights<S>);
+    /// The layer is complete.
+    fn end(&mut self);
+}
+
+enum Step<S> {
+    Visit(NodeId, Weights<S>),
+    Middle(Weights<S>),
+    End,
+}
+
+/// Takes `visitor` through the tree.
+pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>) {
+    let one = [S::one(); 3];
+    let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
+    steps.push(Step::Visit(tree.root(), Weights { total: one, in_top: one, inside: false }));
+    while let Some(step) = steps.pop() {
+        match step {
+            Step::Visit(id, w) => match tree.node(id) {
+                Node::Zero => {}
+                Node::Add(a, b) => {
+                    steps.push(Step::Visit(b, w));
+                    steps.push(Step::Visit(a, w));
+                }
+                Node::Mul(weight, c) => steps.push(Step::Visit(c, w.times(weight.map(S::from_f32)))),
+                Node::Layer { top, base } => {
+                    steps.push(Step::End);
+                    steps.push(Step::Visit(base, w));
+                    steps.push(Step::Middle(w));
+                    steps.push(Step::Visit(top, Weights { in_top: one, inside: true, ..w }));
+                    visitor.begin();
+                }
+                Node::Lobe { kind, site, slots } => {
+                    let values = tree.values(kind, slots);
+                    let weights = w.times(kind.weight(values).map(S::from_f32));
+                    visitor.lobe(LobeVisit { kind, site, values, weights });
+                }
+            },
+            Step::Middle(w) => visitor.middle(w),
+            Step::End => visitor.end(),
+        }
+    }
+}
+
+/// The normal and the tangent a lobe asks for: its own, or the shading point's.
+pub(super) fn directions(kind: LobeKind, values: &[f32], globals: &Globals) -> (Vec3, Vec3) {
+    let spec = kind.spec();
+    let vector =
+        |slot: Option<usize>, default: Vec3| slot.and_then(|s| values.get(s..s + 3)).map_or(default, Vec3::from_slice);
+    (vector(spec.normal_slot(), globals.n), vector(spec.tangent_slot(), globals.dpdu))
+}
+
+/// The frame that [`directions`] span.
+pub(super) fn frame<S: Scalar>((n, t): (Vec3, Vec3), globals: &Globals) -> Frame<S> {
+    let v = |v: Vec3| V3::from_f32(v.to_array());
+    Frame::new(v(n), v(globals.ng), v(t), v(globals.dpdu))
+}
