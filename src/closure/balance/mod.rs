@@ -179,8 +179,8 @@ pub struct Balancer {
 }
 
 /// Rows over the weight of a top, and over a parameter of it that varies.
-const WEIGHTS: usize = 12;
-const PARAMS: usize = 24;
+const WEIGHTS: usize = 8;
+const PARAMS: usize = 32;
 
 impl Balancer {
     /// Tables as fine as the precision asks for.
@@ -325,7 +325,7 @@ impl Balancer {
     }
 }
 
-/// More pairs of sites than this keep `min`: solving takes tens of milliseconds and up to 72 KiB each.
+/// More pairs of sites than this keep `min`: solving takes tens of milliseconds and up to 64 KiB each.
 pub const MAX_PAIRS: usize = 8;
 
 /// Whether f depends on the angles to the normal and between the directions alone.

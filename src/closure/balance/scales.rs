@@ -27,9 +27,9 @@ pub(super) struct Row<S> {
     param: S,
 }
 
-/// The weight at `x` in [0, 1] along the table: graded toward 1, where the top takes all and s changes fastest.
-pub(super) fn weight_at(x: f64) -> f64 {
-    1.0 - (1.0 - x).powi(2)
+/// The weight of row `i` of `rows`: graded toward 1, where the top takes all and s changes fastest.
+pub(super) fn weight_at(i: usize, rows: usize) -> f64 {
+    1.0 - (1.0 - i as f64 / (rows - 1) as f64).powi(2)
 }
 
 /// The cosine at `x` in [0, 1] along a row. The horizon itself, where a one-sided lobe is black, is approached only.
@@ -40,7 +40,11 @@ pub(super) fn cosine_at(x: f64) -> f64 {
 impl<S: Scalar> Scales<S> {
     /// The row for a top of weight `w`, its parameter at `p`; what does not vary is ignored.
     pub fn row(&self, w: S, p: S) -> Row<S> {
-        let (i, weight) = cell(S::one() - (S::one() - w).safe_sqrt(), self.weights);
+        let (i, mut weight) = cell(S::one() - (S::one() - w).safe_sqrt(), self.weights);
+        if self.weights > 1 {
+            let (a, b) = (weight_at(i, self.weights), weight_at(i + 1, self.weights));
+            weight = ((w - S::c(a)) * S::c(1.0 / (b - a))).clamp(S::zero(), S::one());
+        }
         let (j, param) = cell((p.safe_sqrt() - self.lo) * self.inv_range, self.params);
         Row { first: (j * self.weights + i) as u32, weight, param }
     }

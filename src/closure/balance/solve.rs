@@ -108,11 +108,12 @@ impl Kernel {
     /// Rows over the weight of the top and its parameter, lowered so that nothing between them exceeds its target
     /// either. `bound(y, cosine)` is the top's albedo bound at `y` in [0, 1] along the parameter.
     pub(super) fn solve_rows(&self, weights: usize, params: usize, bound: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f64> {
-        let at = |i: usize, count: usize| i as f64 / (2 * (count.max(2) - 1)) as f64;
+        let along = |j: usize| j as f64 / (2 * (params.max(2) - 1)) as f64;
         // Targets at the rows and halfway between them.
         let targets = |i: usize, j: usize| -> Vec<f64> {
-            let w = weight_at(at(i, weights));
-            let target = |k| (1.0 - w * bound(at(j, params), probe_cosine(k, self.nodes))).clamp(0.0, 1.0);
+            // Reading is linear in the weight itself between two rows.
+            let w = 0.5 * (weight_at(i / 2, weights) + weight_at(i.div_ceil(2), weights));
+            let target = |k| (1.0 - w * bound(along(j), probe_cosine(k, self.nodes))).clamp(0.0, 1.0);
             (0..probes(self.nodes)).map(target).collect()
         };
         let all: Vec<(usize, usize)> = (0..params).flat_map(|j| (0..weights).map(move |i| (i, j))).collect();
@@ -167,7 +168,7 @@ fn directions<S: Scalar>(nodes: usize) -> Vec<Ring<S>> {
     rings
 }
 
-/// The weights of ⟨s⟩ per channel; where nothing is scattered ⟨s⟩ is s itself, of no consequence.
+/// The weights of ⟨s⟩ per channel; where nothing is scattered they do not matter.
 fn row<S: Scalar>(lobe: &AnyLobe<S>, curve: &AlbedoCurve<S>, rings: &[Ring<S>], nodes: usize) -> [Vec<f64>; 3] {
     let mut rows = [(); 3].map(|()| vec![0.0; nodes]);
     for ring in rings {
