@@ -181,6 +181,11 @@ impl Material {
         self.inner.engine.tier
     }
 
+    /// How layers scale what lies below them.
+    pub fn layering(&self) -> LayeringRule {
+        self.inner.engine.layering.rule
+    }
+
     /// What looked wrong while specialising and is not an error.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.inner.program.warnings

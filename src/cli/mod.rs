@@ -80,6 +80,9 @@ enum Command {
     Tree {
         /// The script; `-` reads stdin.
         file: PathBuf,
+        /// Also tell how each lobe below a layer is scaled, and why.
+        #[arg(long)]
+        explain: bool,
     },
     /// Evaluate f·|cos θi| and the pdf for a pair of directions.
     Eval {
@@ -146,7 +149,7 @@ type Outcome = Result<(), Failure>;
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match &cli.command {
-        Command::Tree { file } => tree::run(&cli.global, file),
+        Command::Tree { file, explain } => tree::run(&cli.global, file, *explain),
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),

@@ -67,6 +67,17 @@ impl Unbalanced {
     }
 }
 
+/// What became of a lobe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fate {
+    /// No layer lies above it.
+    Uncovered,
+    /// Its scale was solved for.
+    Balanced,
+    /// It keeps `min`.
+    Min(Unbalanced),
+}
+
 /// Solved scales for the lobes of a tree or of a material.
 #[derive(Clone, Debug)]
 pub struct Balance<S> {
@@ -77,8 +88,8 @@ pub struct Balance<S> {
 
 #[derive(Clone, Debug)]
 enum Plan {
-    /// For a tree that is always the same: what became of each lobe, in the order they are met. `None`: no layer above.
-    Lobes(Vec<Option<Result<usize, Unbalanced>>>),
+    /// For a tree that is always the same: the scales of each lobe, in the order they are met.
+    Lobes(Vec<(LobeKind, Fate, Option<usize>)>),
     /// For trees that vary.
     Pairs(Vec<Pair>),
 }
@@ -99,11 +110,11 @@ impl<S: Scalar> Balance<S> {
         self.scales.iter().map(Scales::bytes).sum()
     }
 
-    /// For a tree that is the same everywhere: why each lobe below a layer keeps `min`, in the order they are met;
-    /// `None` for lobes that are balanced or have nothing above them. Empty for other materials.
-    pub fn unbalanced(&self) -> Vec<Option<Unbalanced>> {
+    /// For a tree that is the same everywhere: what became of each lobe, in the order they are met, tops first. Empty
+    /// for other materials.
+    pub fn fates(&self) -> Vec<(LobeKind, Fate)> {
         match &self.plan {
-            Plan::Lobes(lobes) => lobes.iter().map(|l| l.and_then(Result::err)).collect(),
+            Plan::Lobes(lobes) => lobes.iter().map(|l| (l.0, l.1)).collect(),
             Plan::Pairs(_) => vec![],
         }
     }
@@ -139,7 +150,7 @@ impl<S: Scalar> Balance<S> {
     ) -> Option<Balanced<'_, S>> {
         match &self.plan {
             Plan::Lobes(lobes) => {
-                let scales = &self.scales[(*lobes.get(met)?)?.ok()?];
+                let scales = &self.scales[lobes.get(met)?.2?];
                 Some(Balanced::new(scales, scales.row(S::zero(), S::zero()), cos_o))
             }
             Plan::Pairs(pairs) => {
@@ -211,10 +222,11 @@ impl Balancer {
             })
             .collect();
         let mut balance = Balance { scales: vec![], plan: Plan::Lobes(vec![]), tint };
-        let found = lobes.into_iter().enumerate().map(|(met, kernel)| {
-            let kernel = match kernel? {
-                Ok(kernel) => kernel,
-                Err(why) => return Some(Err(why)),
+        let found = lobes.into_iter().enumerate().map(|(met, (kind, kernel))| {
+            let kernel = match kernel {
+                None => return (kind, Fate::Uncovered, None),
+                Some(Err(why)) => return (kind, Fate::Min(why), None),
+                Some(Ok(kernel)) => kernel,
             };
             let alpha = |c: usize| alphas.iter().map(|a| a[met][c]).collect::<Vec<f64>>();
             let colors = [alpha(0), alpha(1), alpha(2)];
@@ -224,7 +236,7 @@ impl Balancer {
             let values = solved.map(S::c).collect();
             let (lo, inv_range) = (S::zero(), S::zero());
             balance.scales.push(Scales { values, nodes, weights: 1, params: 1, channels, lo, inv_range });
-            Some(Ok(balance.scales.len() - 1))
+            (kind, Fate::Balanced, Some(balance.scales.len() - 1))
         });
         let found = found.collect();
         Balance { plan: Plan::Lobes(found), ..balance }
@@ -377,7 +389,7 @@ struct Planner<'a, S: Scalar> {
     globals: &'a Globals,
     curves: &'a Curves<S>,
     chain: Chain<S>,
-    lobes: Vec<Option<Result<Arc<Kernel>, Unbalanced>>>,
+    lobes: Vec<(LobeKind, Option<Result<Arc<Kernel>, Unbalanced>>)>,
     balancer: &'a mut Balancer,
 }
 
@@ -397,7 +409,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
         let LobeVisit { kind, site, values, .. } = visit;
         if kind.class() == LobeClass::Emission {
-            self.lobes.push(None);
+            self.lobes.push((kind, None));
             return;
         }
         let normal = walk::frame(walk::directions(kind, values, self.globals), self.globals).n;
@@ -405,7 +417,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
             self.chain.fits(normal)?;
             self.balancer.kernel(kind, site, values, self.curves, self.balancer.nodes)
         });
-        self.lobes.push(fate);
+        self.lobes.push((kind, fate));
         self.chain.lobe(&visit, normal, S::zero());
     }
 }
