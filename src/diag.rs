@@ -294,6 +294,7 @@ pub const CODES: &[(&str, &str)] = &[
     ("W0501", "`Ci` is never assigned"),
     ("W0502", "a statement without effect"),
     ("W0503", "a parameter lies outside its declared range"),
+    ("W0504", "the top of a layer transmits"),
 ];
 
 #[cfg(test)]

@@ -174,7 +174,18 @@ impl CheckedShader {
         if !needs.errors.is_empty() {
             return Err(needs.errors);
         }
-        Ok(lower::lower(&body, &needs, warnings))
+        let mut program = lower::lower(&body, &needs, warnings);
+        for top in program.tops() {
+            let site = &program.sites[top as usize];
+            if site.kind.transmits() {
+                let message = format!("what `{}` transmits counts as spent in a top", site.kind.spec().name);
+                let d = Diagnostic::warning("W0504", site.span, message);
+                program
+                    .warnings
+                    .push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
+            }
+        }
+        Ok(program)
     }
 
     /// The program with every parameter left open: read from memory at every point instead of folded away. What

@@ -195,6 +195,22 @@ impl LobeKind {
         self.spec().class
     }
 
+    /// Whether the lobe, at its defaults, sends light to the other side.
+    pub fn transmits(self) -> bool {
+        let mut values = Vec::new();
+        for p in self.spec().params {
+            if p.default.is_empty() {
+                values.extend([0.0; 3].iter().take(p.ty.slots()));
+            } else {
+                values.extend(p.default);
+            }
+        }
+        let (curve, wo) = (AlbedoCurve::default(), V3::polar(0.8, 0.0));
+        let lobe = AnyLobe::<f64>::new(self, &values, wo, &curve);
+        let below = |cos: f64| lobe.f(V3::polar(-cos, 0.4), &curve).iter().any(|f| *f > 0.0);
+        lobe.delta().is_some_and(|(wi, _)| wi.z < 0.0) || [0.1, 0.5, 0.9].into_iter().any(below)
+    }
+
     /// The lobe called `name`.
     pub fn by_name(name: &str) -> Option<LobeKind> {
         LobeKind::ALL.iter().copied().find(|k| k.spec().name == name)
