@@ -1,80 +1,104 @@
 //! Which lobes a program may lay over which.
 
 use super::program::{Instr, Program};
-use std::collections::BTreeSet;
+use smallvec::{SmallVec, smallvec};
+use std::collections::{BTreeSet, HashSet};
 
-/// What a closure register may hold, by sites.
-#[derive(Clone, Default, PartialEq)]
-struct Held {
-    /// Lobes it may be, weighted, and nothing else.
-    single: BTreeSet<u32>,
-    /// Lobes in it with no layer above them.
-    open: BTreeSet<u32>,
-    /// Lobes in it.
-    all: BTreeSet<u32>,
-}
+/// Registers looked at in search of pairs, at most: every layer looks through its whole base.
+const BUDGET: usize = 1 << 16;
 
-impl Held {
-    fn extend(&mut self, o: Held) {
-        self.single.extend(o.single);
-        self.open.extend(o.open);
-        self.all.extend(o.all);
-    }
-
-    /// Both, as a sum.
-    fn with(&self, o: &Held) -> Held {
-        let mut sum = Held { single: BTreeSet::new(), ..self.clone() };
-        sum.extend(Held { single: BTreeSet::new(), ..o.clone() });
-        sum
+/// The closure registers an instruction reads.
+fn operands(instr: Instr) -> SmallVec<[u32; 2]> {
+    match instr {
+        Instr::CopyC { src, .. } => smallvec![src],
+        Instr::MulC { closure, .. } => smallvec![closure],
+        Instr::AddC { a, b, .. } => smallvec![a, b],
+        Instr::Layer { top, base, .. } => smallvec![top, base],
+        _ => smallvec![],
     }
 }
 
 impl Program {
     /// Every pair of sites (top, base) such that the lobe made at `top` may be a whole top, and the one made at `base`
-    /// lie below it and below no other layer. May name pairs that never come about; a pair that is missing rests on a
-    /// term that happened to be black.
+    /// lie below it and below no other layer. May name pairs that never come about. A pair is missing where it rests on
+    /// a term that happened to be black, or in programs of very many layers.
     pub fn layer_pairs(&self) -> Vec<(u32, u32)> {
+        let writers = self.writers();
+        let mut budget = BUDGET;
         let mut pairs = BTreeSet::new();
-        self.each_layer(|top, base| {
-            pairs.extend(top.single.iter().flat_map(|t| base.open.iter().map(|b| (*t, *b))));
-        });
+        for instr in &self.code {
+            let Instr::Layer { top, base, .. } = *instr else { continue };
+            let single = |i: Instr| match i {
+                Instr::CopyC { .. } | Instr::MulC { .. } => operands(i),
+                _ => smallvec![],
+            };
+            let open = |i: Instr| match i {
+                Instr::Layer { top, .. } => smallvec![top],
+                _ => operands(i),
+            };
+            let tops = self.reach(&writers, &[top], &mut budget, single);
+            let bases = self.reach(&writers, &[base], &mut budget, open);
+            pairs.extend(tops.iter().flat_map(|t| bases.iter().map(|b| (*t, *b))));
+            if budget == 0 {
+                break;
+            }
+        }
         pairs.into_iter().collect()
     }
 
     /// Every site whose lobe may stand in the top of a layer.
     pub fn tops(&self) -> Vec<u32> {
-        let mut tops = BTreeSet::new();
-        self.each_layer(|top, _| tops.extend(&top.all));
-        tops.into_iter().collect()
+        let tops = self.code.iter().filter_map(|i| match i {
+            Instr::Layer { top, .. } => Some(*top),
+            _ => None,
+        });
+        let tops: Vec<u32> = tops.collect();
+        if tops.is_empty() {
+            return vec![];
+        }
+        self.reach(&self.writers(), &tops, &mut usize::MAX.clone(), operands)
     }
 
-    /// Calls `see` with what top and base of each layer may hold, at least once with all of it.
-    fn each_layer(&self, mut see: impl FnMut(&Held, &Held)) {
-        let mut held = vec![Held::default(); self.closures];
-        // Without regard to the order in which registers are written: until nothing is new.
-        loop {
-            let before = held.clone();
-            for instr in &self.code {
-                let (dst, new) = match *instr {
-                    Instr::Lobe { site, dst, .. } => {
-                        let one = BTreeSet::from([site]);
-                        (dst, Held { single: one.clone(), open: one.clone(), all: one })
-                    }
-                    Instr::CopyC { dst, src } => (dst, held[src as usize].clone()),
-                    Instr::MulC { dst, closure, .. } => (dst, held[closure as usize].clone()),
-                    Instr::AddC { dst, a, b } => (dst, held[a as usize].with(&held[b as usize])),
-                    Instr::Layer { dst, top, base } => {
-                        let (top, base) = (&held[top as usize], &held[base as usize]);
-                        see(top, base);
-                        (dst, Held { open: top.open.clone(), ..top.with(base) })
-                    }
-                    _ => continue,
-                };
-                held[dst as usize].extend(new);
-            }
-            if held == before {
-                return;
+    /// The instructions that write each closure register. Their order does not matter here.
+    fn writers(&self) -> Vec<Vec<usize>> {
+        let mut writers = vec![vec![]; self.closures];
+        for (at, instr) in self.code.iter().enumerate() {
+            match *instr {
+                Instr::Lobe { dst, .. }
+                | Instr::CopyC { dst, .. }
+                | Instr::MulC { dst, .. }
+                | Instr::AddC { dst, .. }
+                | Instr::Layer { dst, .. } => writers[dst as usize].push(at),
+                _ => {}
             }
         }
+        writers
+    }
+
+    /// The sites of all lobes that registers reachable from `from` may hold, going on as `follow` says.
+    fn reach(
+        &self,
+        writers: &[Vec<usize>],
+        from: &[u32],
+        budget: &mut usize,
+        follow: impl Fn(Instr) -> SmallVec<[u32; 2]>,
+    ) -> Vec<u32> {
+        let mut seen: HashSet<u32> = from.iter().copied().collect();
+        let mut waiting: Vec<u32> = seen.iter().copied().collect();
+        let mut sites = BTreeSet::new();
+        while let Some(register) = waiting.pop() {
+            *budget = budget.saturating_sub(1);
+            if *budget == 0 {
+                break;
+            }
+            for at in &writers[register as usize] {
+                let instr = self.code[*at];
+                if let Instr::Lobe { site, .. } = instr {
+                    sites.insert(site);
+                }
+                waiting.extend(follow(instr).into_iter().filter(|r| seen.insert(*r)));
+            }
+        }
+        sites.into_iter().collect()
     }
 }
