@@ -135,6 +135,43 @@ fn a_cloth_with_a_varying_preset_never_gains() {
     }
 }
 
+/// Cloths from sharp, flat and pale to steep, dull and glassy.
+const CLOTHS: [&[(&str, f32)]; 5] = [
+    &[("A1", 1.0), ("A2", 1.0), ("offset1", 0.0), ("offset2", 0.0), ("gamma_s1", 2.0), ("gamma_v1", 2.0), ("kd1", 0.0)],
+    &[("A1", 1.0), ("A2", 1.0), ("eta1", 1.0), ("eta2", 3.0), ("a1", 1.0), ("a2", 1.0), ("gamma_v2", 2.0)],
+    &[("A1", 1.0), ("A2", 0.3), ("offset1", 60.0), ("offset2", 7.0), ("gamma_s1", 2.0), ("gamma_v1", 90.0)],
+    &[("A1", 1.0), ("A2", 1.0), ("offset1", 60.0), ("offset2", 60.0), ("eta1", 1.05), ("eta2", 1.05), ("a1", 0.9)],
+    &[("A1", 1.0), ("a1", 1.0), ("a2", 0.0), ("offset1", 3.0), ("gamma_s1", 4.0), ("gamma_v1", 8.0), ("kd1", 1.0)],
+];
+
+#[test]
+fn cloths_of_any_threads_never_gain() {
+    let mut rng = Pcg64Mcg::seed_from_u64(26);
+    for (set, unknown) in CLOTHS.iter().zip(["offset1", "eta1", "gamma_v1", "a1", "kd1"]) {
+        for unknown in [&[][..], &[unknown], &["A1", "A2"]] {
+            let largest = hold(LobeKind::MicrocylinderThreads, set, unknown, 6, &mut rng);
+            println!("{set:?}, unknown {unknown:?}: {largest:.5}");
+        }
+    }
+}
+
+/// Any values within their ranges, and the table or the closed forms.
+#[test]
+fn cloths_of_random_threads_never_gain() {
+    let mut rng = Pcg64Mcg::seed_from_u64(27);
+    for k in 0..6 {
+        let params = LobeKind::MicrocylinderThreads.spec().params.iter().skip(2);
+        // Ends as often as what lies between.
+        let mut pick = |lo: f32, hi: f32| match rng.random_range(0..4) {
+            0 => lo,
+            1 => hi,
+            _ => lo + (hi - lo) * rng.random::<f32>().powi(2),
+        };
+        let set: Vec<(&str, f32)> = params.map(|p| (p.name, pick(p.min, p.max))).collect();
+        hold(LobeKind::MicrocylinderThreads, &set, if k % 2 == 0 { &["gamma_s2"] } else { &[] }, 6, &mut rng);
+    }
+}
+
 #[test]
 fn known_parameters_never_gain_anywhere() {
     let mut rng = Pcg64Mcg::seed_from_u64(24);

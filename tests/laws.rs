@@ -173,7 +173,10 @@ fn odd_numbers_give_finite_results() {
     for &kind in LobeKind::ALL {
         for _ in 0..40 {
             let values = block(kind, |_| Some(ODD[rng.random_range(0..ODD.len())]));
-            let stack = single::<f32>(kind, &values);
+            let mut tree = ClosureTree::new();
+            let lobe = tree.lobe(kind, 0, &values);
+            tree.set_root(lobe);
+            let stack = Stack::<f32>::new(tree, Precision::FAST);
             for _ in 0..400 {
                 let mut odd = || ODD[rng.random_range(0..ODD.len())];
                 let mut direction = || [odd(), odd(), odd()];

@@ -43,12 +43,24 @@ pub struct FibreSpec {
     pub margin: f64,
     /// Whether the albedo is even in x.
     pub mirrored: bool,
+    /// For a cloth of two families of threads, along x and along y, the ridges of each. The kernel is then asked for one
+    /// family's part of f at a time, 0 or 1 in the last entry of the key, and that is integrated about its own threads.
+    pub weave: Option<[Ridges; 2]>,
+}
+
+/// Where the ridges of a family of threads lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ridges {
+    /// Standard deviation of one ridge in θi, in radians.
+    pub width: f64,
+    /// How far from θi = −θo they may lie, in radians.
+    pub reach: f64,
 }
 
 impl PartialEq for FibreSpec {
     fn eq(&self, o: &Self) -> bool {
         let parts = |s: &Self| (s.key, s.components, s.axis, s.width, s.around, s.detail, s.margin, s.mirrored);
-        std::ptr::fn_addr_eq(self.kernel, o.kernel) && parts(self) == parts(o)
+        std::ptr::fn_addr_eq(self.kernel, o.kernel) && parts(self) == parts(o) && self.weave == o.weave
     }
 }
 
@@ -88,11 +100,22 @@ pub struct FibreTables<S> {
     nodes: usize,
     /// Rows go over this entry of the key in place of φ.
     axis: Option<usize>,
+    /// There are threads along y as well: nodes are dense toward the poles of both families.
+    crossed: bool,
 }
 
 impl<S> Default for FibreTables<S> {
     fn default() -> Self {
-        FibreTables { view: vec![], bound: vec![], components: 0, sheets: 1, rows: 1, nodes: 0, axis: None }
+        FibreTables {
+            view: vec![],
+            bound: vec![],
+            components: 0,
+            sheets: 1,
+            rows: 1,
+            nodes: 0,
+            axis: None,
+            crossed: false,
+        }
     }
 }
 
@@ -139,7 +162,15 @@ impl<S: Real> FibreTables<S> {
             let i = x.floor().min(L::c((n.max(2) - 2) as f64));
             (i, x - i)
         };
-        let (i, s) = cell((across / (across + w.x.abs()).max(tiny)).sqrt(), self.nodes);
+        let inv = L::one() / (across + w.x.abs()).max(tiny);
+        let place = if self.crossed {
+            let half = L::c(0.5).sqrt();
+            let (near, far) = (half * (across * inv).sqrt(), L::one() - half * (w.x.abs() * inv).sqrt());
+            L::select(across.lt(w.x.abs()), near, far)
+        } else {
+            (across * inv).sqrt()
+        };
+        let (i, s) = cell(place, self.nodes);
         let row = if self.axis.is_some() { t } else { (z / (z + w.y.abs()).max(tiny)).sqrt() };
         let (j, r) = cell(row, self.rows);
         let sheet = if self.sheets == 2 {
@@ -181,7 +212,7 @@ impl FibreSpec {
         let rows = match self.axis {
             Some(_) if self.around => (precision.axis_nodes / 2).max(8),
             Some(_) => precision.axis_nodes,
-            None if self.around => (size / if self.detail < 1.0 { 6 } else { 10 }).clamp(8, 28),
+            None if self.around => (size / if self.weave.is_some() { 4 } else { 10 }).clamp(8, 28),
             None => 1,
         };
         let sheets = if self.mirrored { 1 } else { 2 };
@@ -203,6 +234,7 @@ impl FibreSpec {
             rows,
             nodes,
             axis: self.axis,
+            crossed: self.weave.is_some(),
         };
         let lifts = grid.shortfalls(&tables);
         for (c, chunk) in tables.bound.chunks_mut(sheets * plane).enumerate() {
@@ -230,14 +262,20 @@ impl Grid<'_> {
 
     /// The direction at a node; just above the horizon in place of the horizon itself.
     fn direction(&self, sheet: usize, row: f64, node: f64) -> V3<f64> {
-        let along = (node / (self.nodes - 1) as f64).powi(2).max(1e-9);
+        let place = node / (self.nodes - 1) as f64;
         let around = match self.spec.axis {
             None if self.rows > 1 => (row / (self.rows - 1) as f64).powi(2),
             _ => 1.0,
         };
+        // A cloth's f is a quotient of small numbers there, and has to stay away from their limits.
+        let (along, least) = match self.spec.weave {
+            Some(_) if place < 0.5 => ((2.0 * place * place).max(1e-5), 1e-5),
+            Some(_) => (1.0 - 2.0 * (1.0 - place).powi(2), 1e-5),
+            None => (place.powi(2).max(1e-9), 1e-12),
+        };
         let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
         let (cos, sin) = unit(along, 1.0 - along);
-        let (z, y) = unit(around.max(1e-12), 1.0 - around);
+        let (z, y) = unit(around.max(least), 1.0 - around);
         V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
     }
 
@@ -298,9 +336,11 @@ impl Grid<'_> {
     }
 }
 
-/// A product rule over (θi, φi), split at the ridge θi = −θo and graded toward it.
+/// A product rule over (θi, φi) that follows the ridges.
 pub struct FibreQuadrature {
     along: Rule,
+    /// For one cell of a family's ridges.
+    cell: Rule,
     around: Vec<(f64, f64, f64)>,
 }
 
@@ -316,33 +356,105 @@ impl FibreQuadrature {
         };
         FibreQuadrature {
             along: Rule::gauss_legendre(precision.polar.min(40)),
+            cell: Rule::gauss_legendre((precision.polar / 5).clamp(4, 8)),
             around: around.nodes.iter().zip(&around.weights).map(point).collect(),
         }
     }
 
     /// ∫ f·μ over the other direction, per component.
     pub fn albedos(&self, spec: &FibreSpec, key: &FibreKey, w: V3<f64>) -> [f64; COMPONENTS] {
-        let ridge = -w.x.atan2(w.y.hypot(w.z));
-        let mut ring = vec![w; self.around.len()];
-        let mut values = vec![[0.0; COMPONENTS]; self.around.len()];
+        let ridge = |w: V3<f64>| -w.x.atan2(w.y.hypot(w.z));
+        let Some(families) = spec.weave else {
+            return self.ring_by_ring(spec, key, w, &self.graded(ridge(w), spec.width), |wi| wi);
+        };
+        let mut key = *key;
         let mut sums = [0.0; COMPONENTS];
+        for (family, ridges) in families.iter().enumerate() {
+            key[key.len() - 1] = family as f64;
+            let part = if family == 0 {
+                self.ring_by_ring(spec, &key, w, &self.cells(ridge(w), ridges), |wi| wi)
+            } else {
+                // About y: a quarter turn and back.
+                let along = self.cells(ridge(V3::new(w.y, -w.x, w.z)), ridges);
+                self.ring_by_ring(spec, &key, w, &along, |wi| V3::new(-wi.y, wi.x, wi.z))
+            };
+            sums = std::array::from_fn(|c| sums[c] + part[c]);
+        }
+        sums
+    }
+
+    /// Points and weights in θi: θ = ridge + length·uᵖ on each side, a third of the points within the ridge's width.
+    fn graded(&self, ridge: f64, width: f64) -> Vec<(f64, f64)> {
+        let mut points = Vec::with_capacity(2 * self.along.nodes.len());
         for length in [FRAC_PI_2 - ridge, -FRAC_PI_2 - ridge] {
             if length.abs() < 1e-9 {
                 continue;
             }
-            // θ = ridge + length·uᵖ: a third of the points lie within the ridge's width.
-            let power = ((spec.width / length.abs()).ln() / 0.35f64.ln()).clamp(1.0, 6.0);
+            let power = ((width / length.abs()).ln() / 0.35f64.ln()).clamp(1.0, 6.0);
             for (u, weight) in self.along.nodes.iter().zip(&self.along.weights) {
-                let (sin, cos) = (ridge + length * u.powf(power)).sin_cos();
-                let weight = weight * length.abs() * power * u.powf(power - 1.0) * cos * cos;
-                for (wi, &(y, z, _)) in ring.iter_mut().zip(&self.around) {
-                    *wi = V3::new(sin, cos * y, cos * z);
+                points.push((ridge + length * u.powf(power), weight * length.abs() * power * u.powf(power - 1.0)));
+            }
+        }
+        points
+    }
+
+    /// Points and weights in θi: cells of two widths over all the ridges, growing twofold beyond them, and shrinking
+    /// twofold where the ridges reach the thread's end, toward which f grows.
+    fn cells(&self, center: f64, ridges: &Ridges) -> Vec<(f64, f64)> {
+        let half = ridges.reach + 4.0 * ridges.width;
+        let (lo, hi) = ((center - half).max(-FRAC_PI_2), (center + half).min(FRAC_PI_2));
+        let count = ((hi - lo) / (2.0 * ridges.width)).ceil().max(1.0);
+        let step = (hi - lo) / count;
+        let mut edges: Vec<f64> = (0..=count as usize).map(|k| lo + step * k as f64).collect();
+        for (start, end) in [(lo, -FRAC_PI_2), (hi, FRAC_PI_2)] {
+            let way = (end - start).abs();
+            if way < 1e-6 {
+                // As far as cos θo, and only where the ridge is: beyond, f no longer grows.
+                let least = (0.3 * center.cos()).max(5e-3);
+                let mut length = 0.5 * step;
+                while length > least && center * end > 0.0 {
+                    edges.push(end - length.copysign(end));
+                    length *= 0.5;
                 }
-                (spec.kernel)(key, w, &ring, &mut values);
-                for (value, a) in values.iter().zip(&self.around) {
-                    for c in 0..spec.components {
-                        sums[c] += weight * a.2 * value[c];
-                    }
+            } else {
+                let mut along = 2.0 * ridges.width;
+                while along < 0.8 * way {
+                    edges.push(start + along.copysign(end));
+                    along *= 3.0;
+                }
+                edges.push(end);
+            }
+        }
+        edges.sort_by(f64::total_cmp);
+        let rule = || self.cell.nodes.iter().zip(&self.cell.weights);
+        let cell = |e: &[f64]| {
+            let (a, length) = (e[0], e[1] - e[0]);
+            rule().map(move |(u, w)| (a + length * u, w * length)).collect::<Vec<_>>()
+        };
+        edges.windows(2).flat_map(cell).collect()
+    }
+
+    /// ∫ f·μ with these points along the thread; `place` brings a direction in the thread's frame into the lobe's.
+    fn ring_by_ring(
+        &self,
+        spec: &FibreSpec,
+        key: &FibreKey,
+        w: V3<f64>,
+        along: &[(f64, f64)],
+        place: impl Fn(V3<f64>) -> V3<f64>,
+    ) -> [f64; COMPONENTS] {
+        let mut ring = vec![w; self.around.len()];
+        let mut values = vec![[0.0; COMPONENTS]; self.around.len()];
+        let mut sums = [0.0; COMPONENTS];
+        for (theta, weight) in along {
+            let (sin, cos) = theta.sin_cos();
+            for (wi, &(y, z, _)) in ring.iter_mut().zip(&self.around) {
+                *wi = place(V3::new(sin, cos * y, cos * z));
+            }
+            (spec.kernel)(key, w, &ring, &mut values);
+            for (value, a) in values.iter().zip(&self.around) {
+                for c in 0..spec.components {
+                    sums[c] += weight * cos * cos * a.2 * value[c];
                 }
             }
         }

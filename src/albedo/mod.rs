@@ -8,4 +8,4 @@ pub mod fibre;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
-pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, TableSpec};
+pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, Ridges, TableSpec};

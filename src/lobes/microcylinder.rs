@@ -8,7 +8,7 @@
 //! The presets are *recalled* from the paper's Table II by way of third-party transcriptions, not read from it, and the
 //! segments of the offset curves are taken as equally long.
 
-use super::cloth::{self, Cloth, EVENLY, TANGENTS, Yarn, weights};
+use super::cloth::{self, Cloth, EVENLY, FLAT, TANGENTS, Yarn, weights};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, TableSpec};
@@ -43,8 +43,6 @@ const fn yarn(
     Yarn { color, eta, kd, gamma_s, gamma_v, cover, lo: ends[0], hi: ends[1], weights }
 }
 
-/// All threads flat.
-const FLAT: &[f64; TANGENTS] = &[1.0, 0.0, 0.0, 0.0, 0.0];
 const CREPE: &[f64; TANGENTS] = &weights(&[-35.0, -35.0, 35.0, 35.0]);
 const SATIN: &[f64; TANGENTS] = &weights(&[-32.0, -32.0, -18.0, 0.0, 0.0, 18.0, 32.0, 32.0]);
 const SHOT: &[f64; TANGENTS] = &weights(&[-25.0, -25.0, 25.0, 25.0]);
@@ -82,7 +80,7 @@ fn preset(index: usize) -> &'static [Yarn; 2] {
 }
 
 fn kernel(key: &FibreKey, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
-    cloth::integrate(preset(key[0] as usize), wo, wi, out);
+    cloth::integrate(preset(key[0] as usize), key[15] as usize, wo, wi, out);
 }
 
 impl<S: Real> Lobe<S> for Microcylinder<S> {
@@ -121,26 +119,5 @@ impl<S: Real> Lobe<S> for Microcylinder<S> {
     #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         self.cloth.albedo_bound(w, curve)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::albedo::Precision;
-
-    #[test]
-    fn a_varying_preset_is_bounded() {
-        for index in 0..PRESETS.len() {
-            let mut values = [Some(0.0f32); 7];
-            values[6] = Some(index as f32);
-            let curve = Microcylinder::<f32>::table(&values).expect("known").bake::<f64>(Precision::FAST);
-            for k in 0..2000 {
-                let (z, turn) = ((k % 40) as f64 / 40.0 + 1e-3, (k / 40) as f64 * 0.1257);
-                let bound = curve.fibre().bound(V3::polar(z.powi(2), turn), 0.0);
-                let limit = cloth::WHOLE_RANGE / z.powi(2).max(0.02);
-                assert!(bound.iter().all(|b| *b < limit), "{index} {z} {turn}: {bound:?}");
-            }
-        }
     }
 }

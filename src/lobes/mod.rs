@@ -10,6 +10,7 @@ pub mod registry;
 
 mod charlie_terms;
 mod cloth;
+mod cloth_range;
 pub mod cylinder;
 pub mod diffuse;
 pub mod emission;
@@ -17,6 +18,7 @@ pub mod eon;
 pub mod fabric;
 mod ltc_tables;
 pub mod microcylinder;
+pub mod microcylinder_threads;
 pub mod oren_nayar;
 pub mod sheen;
 pub mod thread;
@@ -185,6 +187,7 @@ lobes! {
     sheen::Sheen,
     thread::Thread,
     microcylinder::Microcylinder,
+    microcylinder_threads::MicrocylinderThreads,
     velvet::Velvet,
     eon::Eon,
 }
@@ -234,5 +237,5 @@ const LAYER: Form = Form {
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    lobes.chain([LAYER]).chain(sheen::FORMS.iter().copied())
+    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(sheen::FORMS.iter().copied())
 }

@@ -150,6 +150,7 @@ impl<S: Real> Lobe<S> for Thread<S> {
             // up to 0.3 %.
             margin: if axis.is_some() { 5e-3 } else { 0.0 },
             mirrored: true,
+            weave: None,
         }))
     }
 

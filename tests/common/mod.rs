@@ -7,6 +7,8 @@ use overcoat::closure::{Bsdf, ClosureTree, Curves, Layering, NodeId, flatten};
 use overcoat::lobes::LobeKind;
 use overcoat::lobes::registry::{ParamSpec, ParamTy};
 use overcoat::optics::{Scalar, V3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 /// A tree with its tables, ready to be looked at from any direction.
 pub struct Stack<S: Scalar> {
@@ -70,7 +72,7 @@ pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) ->
 }
 
 /// Blocks over a lobe's whole declared range: every parameter at its lower end, default, middle and upper end in turn,
-/// and all combinations for up to three parameters.
+/// and all combinations for up to three parameters; of more than eight, a few mixtures.
 pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     let free: Vec<&ParamSpec> = kind
         .spec()
@@ -78,11 +80,12 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         .iter()
         .filter(|p| !matches!(p.ty, ParamTy::Normal | ParamTy::Vector | ParamTy::Color))
         .collect();
+    let limit = if free.len() > 8 { 100.0 } else { 10.0 };
     let choices: Vec<Vec<f32>> = free
         .iter()
         .map(|p| {
             if p.ty == ParamTy::Float {
-                let (lo, hi) = (p.min.max(0.0), p.max.min(10.0));
+                let (lo, hi) = (p.min.max(0.0), p.max.min(limit));
                 vec![lo, lo + (hi - lo) * 0.1, lo + (hi - lo) * 0.4, hi]
             } else {
                 (p.min as i32..=p.max as i32).map(|v| v as f32).collect()
@@ -90,7 +93,13 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         })
         .collect();
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
-    if choices.len() > 3 {
+    if choices.len() > 8 {
+        // All at either end, and some mixtures.
+        let mut rng = Pcg64Mcg::seed_from_u64(1);
+        sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
+        sets.push(free.iter().map(|p| p.default[0]).collect());
+        sets.extend((0..3).map(|_| choices.iter().map(|c| c[rng.random_range(0..c.len())]).collect::<Vec<_>>()));
+    } else if choices.len() > 3 {
         // One at a time, the others at their defaults; and all at either end.
         let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
