@@ -10,6 +10,9 @@ use crate::closure::balance::Construction;
 use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
 use crate::diag::{Diagnostic, render_all};
 use crate::ir::{self, CheckedShader, GlobalVar, ParamDecl, Program, Value};
+use crate::lobes;
+use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
+use crate::lobes::registry::Form;
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use glam::Vec3;
@@ -38,7 +41,7 @@ impl Tier {
     }
 }
 
-/// Compiles scripts. Cheap to make and to copy.
+/// Compiles scripts. Cheap to make and to clone.
 ///
 /// ```
 /// use overcoat::{Engine, Globals};
@@ -48,10 +51,12 @@ impl Tier {
 /// assert!(bsdf.eval([0.0, 0.6, 0.8]).f_cos[0] > 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Engine {
     tier: Tier,
     layering: Layering,
+    /// Closures of the host, as scripts call them.
+    hosts: Arc<[Form]>,
 }
 
 impl Engine {
@@ -75,14 +80,51 @@ impl Engine {
         Engine { layering: Layering { tint, ..self.layering }, ..self }
     }
 
+    /// Lets scripts call a closure that the host brings along. It is kept until the process ends, so register once, not
+    /// per scene.
+    ///
+    /// ```
+    /// use overcoat::Engine;
+    /// use overcoat::lobes::host::{ClosureSpec, HostLobe};
+    ///
+    /// /// A flat fuzz: f = w/π on the normal's side.
+    /// struct Fuzz;
+    /// impl HostLobe for Fuzz {
+    ///     fn f(&self, values: &[f32], wo: [f64; 3], wi: [f64; 3]) -> [f64; 3] {
+    ///         let above = wo[2] > 0.0 && wi[2] > 0.0;
+    ///         [if above { f64::from(values[3]) / std::f64::consts::PI } else { 0.0 }; 3]
+    ///     }
+    ///     fn albedo_bound(&self, values: &[f32], w: [f64; 3]) -> [f64; 3] {
+    ///         [if w[2] > 0.0 { f64::from(values[3]) } else { 0.0 }; 3]
+    ///     }
+    /// }
+    ///
+    /// let spec = ClosureSpec::new("fuzz").normal("N", "Shading normal.").float("w", 0.5, 0.0..=1.0, "Albedo.");
+    /// let engine = Engine::new().register(spec, Fuzz)?;
+    /// let shader = engine.compile("dusty", "Ci = layer(fuzz(N, 0.3), diffuse(N));")?;
+    /// # let _ = shader;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the signature is malformed, or taken.
+    pub fn register(self, spec: ClosureSpec, lobe: impl HostLobe + 'static) -> Result<Self, RegisterError> {
+        let taken = lobes::forms().chain(self.hosts.iter().copied());
+        let kind = HostKind::register(spec, Box::new(lobe), taken)?;
+        let hosts = self.hosts.iter().copied().chain([kind.form()]).collect();
+        Ok(Engine { hosts, ..self })
+    }
+
     /// Compiles a script. `name` names it in messages, and the shader if the script does not.
     ///
     /// # Errors
     /// Everything that is wrong with the script, with its places.
     pub fn compile(&self, name: &str, text: &str) -> Result<Shader, ScriptError> {
         let source = Arc::new(Source::new(name, text));
-        match ir::compile(name, text) {
-            Ok((checked, warnings)) => Ok(Shader { engine: *self, source, checked: Arc::new(checked), warnings }),
+        match ir::compile_with(name, text, &self.hosts) {
+            Ok((checked, warnings)) => {
+                Ok(Shader { engine: self.clone(), source, checked: Arc::new(checked), warnings })
+            }
             Err(diagnostics) => Err(ScriptError { source, diagnostics }),
         }
     }
@@ -139,7 +181,7 @@ impl Shader {
         let start = Instant::now();
         let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
         let inner = Inner {
-            engine: self.engine,
+            engine: self.engine.clone(),
             name: self.name().to_owned(),
             program,
             tables,

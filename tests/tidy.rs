@@ -15,7 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("closure", &["lobes", "albedo", "optics", "globals"]),
     ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
     ("audit", &["closure", "lobes", "albedo", "optics"]),
-    ("engine", &["ir", "closure", "albedo", "optics", "diag", "span", "globals"]),
+    ("engine", &["ir", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
     ("preview", &["engine", "closure", "lobes", "globals"]),
     (
         "cli",

@@ -22,6 +22,7 @@ pub use shader::{CheckedShader, ParamDecl, Value};
 pub use types::Ty;
 
 use crate::diag::Diagnostic;
+use crate::lobes::registry::Form;
 
 /// Compiles a script. `name` names it in messages, and the shader where the script does not.
 ///
@@ -30,6 +31,18 @@ use crate::diag::Diagnostic;
 /// # Errors
 /// All errors found, with warnings after them.
 pub fn compile(name: &str, source: &str) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
+    compile_with(name, source, &[])
+}
+
+/// The same for a host that brings along closures of its own.
+///
+/// # Errors
+/// All errors found, with warnings after them.
+pub fn compile_with(
+    name: &str,
+    source: &str,
+    hosts: &[Form],
+) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
     let ast = crate::syntax::parse(source)?;
-    check::check(name, &ast)
+    check::check(name, &ast, hosts)
 }

@@ -16,6 +16,7 @@ pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
+pub mod host;
 mod ltc_tables;
 pub mod microcylinder;
 pub mod microcylinder_threads;
@@ -94,26 +95,32 @@ macro_rules! lobes {
     ($( $module:ident :: $Lobe:ident ),* $(,)?) => {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u16)]
-        pub enum LobeKind { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe ),* }
+        pub enum LobeKind {
+            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe, )*
+            /// A closure that a host brought along.
+            Host(host::HostKind),
+        }
 
         impl LobeKind {
-            /// Every lobe there is.
+            /// Every built-in lobe.
             pub const ALL: &[LobeKind] = &[ $( LobeKind::$Lobe ),* ];
 
             /// The lobe's declaration.
             pub fn spec(self) -> &'static LobeSpec {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC ),* }
+                match self {
+                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC, )*
+                    LobeKind::Host(host) => host.spec(),
+                }
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
             pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values) ),* }
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values), )* LobeKind::Host(_) => None }
             }
 
             /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values), )* LobeKind::Host(_) => None }
             }
 
             /// Whether a lobe with these parameter values is reciprocal.
@@ -121,7 +128,7 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
-                } ),* }
+                }, )* LobeKind::Host(host) => host.spec().reciprocal }
             }
 
             /// The color that multiplies a lobe with these parameter values.
@@ -129,49 +136,56 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::weight(&params)
-                } ),* }
+                }, )* LobeKind::Host(_) => [1.0; 3] }
             }
         }
 
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
-        pub enum AnyLobe<S: Real> { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>) ),* }
+        pub enum AnyLobe<S: Real> {
+            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>), )*
+            /// See [`host::HostLobe`].
+            Host(host::Host<S>),
+        }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
             pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-                match kind { $( LobeKind::$Lobe => AnyLobe::$Lobe(
-                    <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)) ),* }
+                match kind {
+                    $( LobeKind::$Lobe => AnyLobe::$Lobe(
+                        <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)), )*
+                    LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
+                }
             }
             /// See [`Lobe::f`].
             #[inline]
             pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve), )* AnyLobe::Host(l) => l.f(wi) }
             }
             /// See [`Lobe::pdf`].
             #[inline]
             pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi), )* AnyLobe::Host(l) => l.pdf(wi) }
             }
             /// See [`Lobe::sample`].
             #[inline]
             pub fn sample(&self, u: [S; 2]) -> V3<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.sample(u) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.sample(u), )* AnyLobe::Host(l) => l.sample(u) }
             }
             /// See [`Lobe::albedo`].
             #[inline]
             pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve), )* AnyLobe::Host(l) => l.albedo(w) }
             }
             /// See [`Lobe::albedo_bound`].
             #[inline]
             pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::delta`].
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
-                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l) ),* }
+                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
             }
         }
     };

@@ -340,9 +340,9 @@ impl Balancer {
 /// More pairs of sites than this keep `min`: solving takes tens of milliseconds and up to 64 KiB each.
 pub const MAX_PAIRS: usize = 8;
 
-/// Whether f depends on the angles to the normal and between the directions alone.
+/// Whether f depends on the angles to the normal and between the directions alone. Of a host's lobe that is not known.
 pub(super) fn follows_normal_only(kind: LobeKind) -> bool {
-    kind.spec().tangent_slot().is_none()
+    !matches!(kind, LobeKind::Host(_)) && kind.spec().tangent_slot().is_none()
 }
 
 /// The parameter of a top that varies, and its declared range.
