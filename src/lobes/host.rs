@@ -160,7 +160,7 @@ impl ClosureSpec {
         if self.params.iter().any(|p| p.name == name) {
             self.wrong.get_or_insert(RegisterError::SameName(name.to_owned()));
         }
-        if !(min <= max) || default.iter().any(|d| !(min..=max).contains(d)) {
+        if min.is_nan() || max.is_nan() || min > max || default.iter().any(|d| !(min..=max).contains(d)) {
             self.wrong.get_or_insert(RegisterError::BadRange(name.to_owned()));
         }
         self.params.push(ParamSpec {

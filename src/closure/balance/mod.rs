@@ -384,12 +384,15 @@ fn is_weight(kind: LobeKind, slot: usize) -> bool {
     kind.weight(&values) == probe
 }
 
+/// The kernel of a lobe, or why it is not balanced; `None` where no layer lies above.
+type Planned = Option<Result<Arc<Kernel>, Unbalanced>>;
+
 /// Finds out which lobes can be balanced.
 struct Planner<'a, S: Scalar> {
     globals: &'a Globals,
     curves: &'a Curves<S>,
     chain: Chain<S>,
-    lobes: Vec<(LobeKind, Option<Result<Arc<Kernel>, Unbalanced>>)>,
+    lobes: Vec<(LobeKind, Planned)>,
     balancer: &'a mut Balancer,
 }
 
