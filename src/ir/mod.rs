@@ -8,6 +8,7 @@
 mod body;
 mod builtins;
 mod check;
+mod functions;
 mod lower;
 mod ops;
 mod pairs;

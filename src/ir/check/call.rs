@@ -67,8 +67,20 @@ impl<'a> Checker<'a> {
         if given.typed.iter().any(|arg| arg.ty == Ty::Poison) {
             return Some(self.poison());
         }
-        let converted: Vec<ExprId> =
+        let mut converted: Vec<ExprId> =
             given.typed.iter().zip(params).map(|(arg, param)| self.convert(*arg, param, span)).collect();
+        for (at, value) in converted.iter_mut().enumerate() {
+            if let Some(options) = BUILTINS[index as usize].options(at) {
+                let span = self.span_of(given.ids[at]);
+                if let ast::ExprKind::String(sym) = self.ast.expr(given.ids[at]).kind
+                    && !options.contains(&self.ast.name(sym))
+                {
+                    let d = super::super::passes::needs::unknown_option(self.ast.name(sym), options, span);
+                    return Some(self.error(d));
+                }
+                *value = self.push(ExprKind::OptionIndex(options, *value), Ty::Float, span).id;
+            }
+        }
         Some(match BUILTINS[index as usize].eval {
             Eval::Global(g) => self.push(ExprKind::Global(g), ty, span),
             Eval::MixClosures => self.mix(converted[0], converted[1], converted[2], span),
