@@ -3,13 +3,20 @@
 //! In: a [`Subject`], anything that gives a BSDF for a direction. Out: numbers with error estimates. Everything here
 //! is deterministic, or takes a seeded generator.
 
+pub mod campaign;
 pub mod chi2;
 pub mod cubature;
+pub mod estimate;
 pub mod furnace;
+mod script;
+pub mod trees;
 
+pub use campaign::{Campaign, Tally};
 pub use chi2::{Chi2, chi2, reciprocity_error};
 pub use cubature::Tolerance;
+pub use estimate::{Estimate, estimate};
 pub use furnace::{Albedo, LobeShare, Side, albedo, breakdown};
+pub use script::script;
 
 use crate::closure::Bsdf;
 use crate::optics::Scalar;

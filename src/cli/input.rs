@@ -13,11 +13,7 @@ use std::path::Path;
 
 impl Global {
     pub fn engine(&self) -> Engine {
-        let tier = match self.tier {
-            TierArg::Fast => Tier::Fast,
-            TierArg::Standard => Tier::Standard,
-            TierArg::Reference => Tier::Reference,
-        };
+        let tier = self.tier().unwrap_or_default();
         let rule = match self.layering {
             LayeringArg::Min => LayeringRule::Min,
             LayeringArg::View => LayeringRule::View,
@@ -27,6 +23,15 @@ impl Global {
             TintArg::Channel => TintRule::Channel,
         };
         Engine::new().tier(tier).layering(rule).tint_rule(tint)
+    }
+
+    /// The tier, if one is asked for.
+    pub fn tier(&self) -> Option<Tier> {
+        self.tier.map(|tier| match tier {
+            TierArg::Fast => Tier::Fast,
+            TierArg::Standard => Tier::Standard,
+            TierArg::Reference => Tier::Reference,
+        })
     }
 
     /// Compiles the script at `path` with the parameters of `--set`, then those of `more`.

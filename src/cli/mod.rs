@@ -2,6 +2,7 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod audit;
 mod cost;
 mod eval;
 mod input;
@@ -32,9 +33,9 @@ struct Global {
     /// Set a shader parameter: a number, three numbers `r,g,b`, or a string. Repeatable.
     #[arg(long, global = true, value_name = "NAME=VALUE")]
     set: Vec<String>,
-    /// Accuracy and speed.
-    #[arg(long, global = true, value_enum, default_value = "standard")]
-    tier: TierArg,
+    /// Accuracy and speed; `standard` if not given.
+    #[arg(long, global = true, value_enum)]
+    tier: Option<TierArg>,
     /// How a layer scales what lies below it.
     #[arg(long, global = true, value_enum, default_value = "min")]
     layering: LayeringArg,
@@ -106,6 +107,8 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// Measure random trees of all lobes: does any gain energy?
+    Audit(audit::AuditArgs),
     /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
     Cost {
         /// The script; `-` reads stdin.
@@ -128,6 +131,8 @@ enum Failure {
     Script(String),
     /// Wrong usage, or a file that cannot be read or written.
     Usage(String),
+    /// What was checked does not hold.
+    Check(String),
     /// Whoever reads stdout has gone.
     Closed,
 }
@@ -148,6 +153,7 @@ pub fn main() -> ExitCode {
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Audit(args) => audit::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
@@ -162,6 +168,10 @@ pub fn main() -> ExitCode {
         Err(Failure::Usage(message)) => {
             eprintln!("error: {message}");
             ExitCode::from(2)
+        }
+        Err(Failure::Check(message)) => {
+            eprintln!("{message}");
+            ExitCode::from(3)
         }
     }
 }

@@ -186,9 +186,9 @@ impl<'t, 'b, 'm, S: Scalar, const D: usize> Flattener<'t, 'b, 'm, S, D> {
         }
         let albedo = lobe.albedo(wo, curve);
         let share: Rgb<S> = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
-        // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums estimates in place of bounds.
+        // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         match self.bsdf.layering.rule {
-            LayeringRule::View => self.stack.lobe(w.in_top, albedo),
+            LayeringRule::View => self.stack.lobe(w.in_top, lobe.view_bound(wo, curve)),
             LayeringRule::Min => self.stack.lobe(w.in_top, lobe.albedo_bound(wo, curve)),
         }
         self.bsdf.lobes.push(FlatLobe {
