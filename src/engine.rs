@@ -126,20 +126,21 @@ impl Shader {
             .checked
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
-        Ok(self.finished(program))
+        Ok(self.finished(program, set))
     }
 
     /// The material with every parameter left open, read at every point: what specialising is measured against.
     pub fn unspecialised(&self) -> Material {
-        self.finished(self.checked.unspecialised())
+        self.finished(self.checked.unspecialised(), &[])
     }
 
-    fn finished(&self, program: Program) -> Material {
+    fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
         let curves = bake(program.sites(), self.engine.tier.precision());
         let inner = Inner {
             engine: self.engine,
             name: self.name().to_owned(),
+            set: set.to_vec(),
             program,
             curves,
             baked_in: start.elapsed(),
@@ -163,6 +164,7 @@ pub struct Material {
 struct Inner {
     engine: Engine,
     name: String,
+    set: Vec<(String, Value)>,
     program: Program,
     curves: Curves<f32>,
     baked_in: Duration,
@@ -178,6 +180,16 @@ impl Material {
     /// The tier of the engine that made it.
     pub fn tier(&self) -> Tier {
         self.inner.engine.tier
+    }
+
+    /// How its layers scale.
+    pub fn layering(&self) -> Layering {
+        self.inner.engine.layering
+    }
+
+    /// The parameters that were set, and to what.
+    pub fn params(&self) -> &[(String, Value)] {
+        &self.inner.set
     }
 
     /// What looked wrong while specialising and is not an error.
@@ -215,6 +227,28 @@ impl Material {
     /// If the closure tree goes beyond a budget.
     pub fn shade_reference(&self, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'_, f64>, ShadeError> {
         self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_curves())
+    }
+
+    /// The BSDF of a tree made of this material's lobes, for example of a part of [`tree`](Self::tree), seen from `wo`.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
+        flatten(tree, globals, V3::from_f32(wo.to_array()), self.inner.engine.layering, &self.inner.curves)
+    }
+
+    /// [`flatten`](Self::flatten) in double precision.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten_reference(
+        &self,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f64; 3],
+    ) -> Result<Bsdf<'_, f64>, ShadeError> {
+        let wo = V3::new(wo[0], wo[1], wo[2]);
+        flatten(tree, globals, wo, self.inner.engine.layering, self.reference_curves())
     }
 
     fn flattened<'m, S: Scalar>(

@@ -35,10 +35,11 @@ pub const LEVELS: [f64; 4] = [0.5, 0.9, 0.99, 0.999];
 const DEVIATIONS: f64 = 4.0;
 /// Of the first and the second estimate: 288 samples, 1152 samples.
 const EFFORTS: [usize; 2] = [1, 2];
-/// What quadrature is to reach, and with how much more to try again where it does not agree with the estimate. It stops
-/// as soon as the albedo and its error are below the limit.
-const TOLERANCES: [Tolerance; 2] =
-    [Tolerance { error: 1e-5, evaluations: 600_000 }, Tolerance { error: 1e-6, evaluations: 4_000_000 }];
+/// What quadrature is to reach; it stops as soon as the albedo and its error are below the limit.
+const TOLERANCE: Tolerance = Tolerance { error: 1e-5, evaluations: 600_000 };
+/// Where it does not agree with the estimate, both are repeated with more, and without stopping.
+const AGAIN: Tolerance = Tolerance { error: 1e-5, evaluations: 4_000_000 };
+const EFFORT_AGAIN: usize = 12;
 
 const SIDES: [Side; 2] = [Side::View, Side::Light];
 
@@ -228,7 +229,6 @@ impl Case {
             flatten(tree, &globals, wo, layering, curves).unwrap_or_else(|_| Bsdf::black())
         };
         let w = direction_of(self.cos, self.phi).map(S::c);
-        let mut rough = None;
         for (effort, method) in EFFORTS.into_iter().zip([Method::Sampled, Method::Resampled]) {
             let e = estimate(&subject, self.side, w, effort, rng);
             self.albedo = Albedo { value: e.value, error: e.sigma.into_iter().fold(0.0, f64::max) };
@@ -236,31 +236,36 @@ impl Case {
             if !e.may_reach_one(DEVIATIONS) {
                 return;
             }
-            rough = Some(e);
-        }
-        self.integrate(&subject, w, rough);
-    }
-
-    fn integrate<'m, S: Scalar>(&mut self, subject: &impl super::Subject<'m, S>, w: [S; 3], rough: Option<Estimate>) {
-        self.method = Method::Integrated;
-        for tolerance in TOLERANCES {
-            let enough = |a: &Albedo| a.max() + a.error <= LIMIT;
-            self.albedo = albedo_until(subject, self.side, w, tolerance, enough);
-            let Albedo { value, error } = self.albedo;
-            let largest = self.albedo.max();
-            let agrees = rough.is_none_or(|r| r.agrees(value, error, 1.5 * DEVIATIONS));
-            // Where the error is as small as was asked for and the limit lies within it, nothing is gained as far as
-            // can be told.
-            let known = enough(&self.albedo) || error <= tolerance.error;
-            self.verdict = match known || largest - error > LIMIT {
-                true if agrees && largest - error > LIMIT => Verdict::Gains,
-                true if agrees => Verdict::Holds,
-                _ => Verdict::Unresolved,
-            };
-            if self.verdict != Verdict::Unresolved {
-                return;
+            if method == Method::Resampled {
+                self.integrate(&subject, w, e, TOLERANCE, |a| a.max() + a.error <= LIMIT);
             }
         }
+        if self.verdict == Verdict::Unresolved {
+            let e = estimate(&subject, self.side, w, EFFORT_AGAIN, rng);
+            self.integrate(&subject, w, e, AGAIN, |_| false);
+        }
+    }
+
+    fn integrate<'m, S: Scalar>(
+        &mut self,
+        subject: &impl super::Subject<'m, S>,
+        w: [S; 3],
+        rough: Estimate,
+        tolerance: Tolerance,
+        enough: impl Fn(&Albedo) -> bool,
+    ) {
+        self.method = Method::Integrated;
+        self.albedo = albedo_until(subject, self.side, w, tolerance, enough);
+        let Albedo { value, error } = self.albedo;
+        let largest = self.albedo.max();
+        // As exact as was asked for, and the limit lies within the error: no gain as far as can be told. A difference
+        // below the limit's own slack decides nothing.
+        let known = error <= tolerance.error || largest + error <= LIMIT || largest - error > LIMIT;
+        self.verdict = match known && rough.agrees(value, error + (LIMIT - 1.0), 1.5 * DEVIATIONS) {
+            true if largest - error > LIMIT => Verdict::Gains,
+            true => Verdict::Holds,
+            false => Verdict::Unresolved,
+        };
     }
 
     /// The arguments of `overcoat` that measure this case again, for a script in `file`.
