@@ -5,9 +5,11 @@ mod albedo;
 mod audit;
 mod cost;
 mod eval;
+mod furnace;
 mod input;
 mod lobes;
 mod output;
+mod reciprocity;
 mod render;
 mod reproduce;
 mod sample;
@@ -114,6 +116,10 @@ enum Command {
         /// The script; `-` reads stdin.
         file: PathBuf,
     },
+    /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
+    Furnace(furnace::FurnaceArgs),
+    /// Does the material scatter alike when light and viewer change places?
+    Reciprocity(reciprocity::ReciprocityArgs),
     /// List the closures a script can call.
     Lobes {
         /// Only those of this name.
@@ -155,6 +161,8 @@ pub fn main() -> ExitCode {
         Command::Albedo(args) => albedo::run(&cli.global, args),
         Command::Audit(args) => audit::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
+        Command::Furnace(args) => furnace::run(&cli.global, args),
+        Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
