@@ -169,20 +169,21 @@ impl Shader {
             .checked
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
-        Ok(self.finished(program))
+        Ok(self.finished(program, set))
     }
 
     /// The material with every parameter left open, read at every point: what specialising is measured against.
     pub fn unspecialised(&self) -> Material {
-        self.finished(self.checked.unspecialised())
+        self.finished(self.checked.unspecialised(), &[])
     }
 
-    fn finished(&self, program: Program) -> Material {
+    fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
         let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
         let inner = Inner {
             engine: self.engine.clone(),
             name: self.name().to_owned(),
+            set: set.to_vec(),
             program,
             tables,
             baked_in: start.elapsed(),
@@ -206,6 +207,7 @@ pub struct Material {
 struct Inner {
     engine: Engine,
     name: String,
+    set: Vec<(String, Value)>,
     program: Program,
     tables: Baked<f32>,
     baked_in: Duration,
@@ -223,9 +225,14 @@ impl Material {
         self.inner.engine.tier
     }
 
-    /// How layers scale what lies below them.
-    pub fn layering(&self) -> LayeringRule {
-        self.inner.engine.layering.rule
+    /// How its layers scale.
+    pub fn layering(&self) -> Layering {
+        self.inner.engine.layering
+    }
+
+    /// The parameters that were set, and to what.
+    pub fn params(&self) -> &[(String, Value)] {
+        &self.inner.set
     }
 
     /// What looked wrong while specialising and is not an error.
@@ -263,6 +270,29 @@ impl Material {
     /// If the closure tree goes beyond a budget.
     pub fn shade_reference(&self, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'_, f64>, ShadeError> {
         self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_tables())
+    }
+
+    /// The BSDF of a tree made of this material's lobes, for example of a part of [`tree`](Self::tree), seen from `wo`.
+    /// The `balanced` rule is solved for whole materials; here it is `min`.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
+        flatten(tree, globals, V3::from_f32(wo.to_array()), self.inner.engine.layering, &self.inner.tables.curves)
+    }
+
+    /// [`flatten`](Self::flatten) in double precision.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten_reference(
+        &self,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f64; 3],
+    ) -> Result<Bsdf<'_, f64>, ShadeError> {
+        let wo = V3::new(wo[0], wo[1], wo[2]);
+        flatten(tree, globals, wo, self.inner.engine.layering, &self.reference_tables().curves)
     }
 
     fn flattened<'m, S: Scalar>(
@@ -324,7 +354,7 @@ impl<S: Scalar> Baked<S> {
 
 /// Solves for the scales of the `balanced` rule.
 fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, precision: Precision) -> Balance<S> {
-    let mut balancer = Balancer::new(precision);
+    let balancer = Balancer::new(precision);
     if program.is_constant() {
         // Normals are told apart by the global they come from, so none may coincide here.
         let globals = Globals {

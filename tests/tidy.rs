@@ -14,7 +14,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("lobes", &["albedo", "optics"]),
     ("closure", &["lobes", "albedo", "optics", "globals"]),
     ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
-    ("audit", &["closure", "lobes", "albedo", "optics"]),
+    ("audit", &["engine", "ir", "closure", "lobes", "albedo", "optics", "globals"]),
     ("engine", &["ir", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
     ("preview", &["engine", "closure", "lobes", "globals"]),
     (

@@ -1,7 +1,7 @@
 //! From arguments to materials, directions and values.
 
 use super::{Failure, Global, LayeringArg, TierArg, TintArg};
-use crate::closure::{Bsdf, LayeringRule, TintRule};
+use crate::closure::{Bsdf, ClosureTree, LayeringRule, TintRule};
 use crate::diag::Diagnostic;
 use crate::engine::{Engine, Material, ShadeError, Shader, Tier};
 use crate::globals::Globals;
@@ -13,11 +13,7 @@ use std::path::Path;
 
 impl Global {
     pub fn engine(&self) -> Engine {
-        let tier = match self.tier {
-            TierArg::Fast => Tier::Fast,
-            TierArg::Standard => Tier::Standard,
-            TierArg::Reference => Tier::Reference,
-        };
+        let tier = self.tier().unwrap_or_default();
         let rule = match self.layering {
             LayeringArg::Min => LayeringRule::Min,
             LayeringArg::Balanced => LayeringRule::Balanced,
@@ -28,6 +24,15 @@ impl Global {
             TintArg::Channel => TintRule::Channel,
         };
         Engine::new().tier(tier).layering(rule).tint_rule(tint)
+    }
+
+    /// The tier, if one is asked for.
+    pub fn tier(&self) -> Option<Tier> {
+        self.tier.map(|tier| match tier {
+            TierArg::Fast => Tier::Fast,
+            TierArg::Standard => Tier::Standard,
+            TierArg::Reference => Tier::Reference,
+        })
     }
 
     /// Compiles the script at `path` with the parameters of `--set`, then those of `more`.
@@ -156,17 +161,43 @@ pub fn direction(option: &str, text: &str) -> Result<[f64; 3], Failure> {
 pub trait Evaluate: Scalar {
     /// The BSDF at the default point, seen from `wo`.
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [Self; 3]) -> Result<Bsdf<'m, Self>, ShadeError>;
+
+    /// The BSDF of a part of the material's tree.
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [Self; 3],
+    ) -> Result<Bsdf<'m, Self>, ShadeError>;
 }
 
 impl Evaluate for f32 {
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [f32; 3]) -> Result<Bsdf<'m, f32>, ShadeError> {
         material.shade(globals, wo.into())
     }
+
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f32; 3],
+    ) -> Result<Bsdf<'m, f32>, ShadeError> {
+        material.flatten(tree, globals, wo.into())
+    }
 }
 
 impl Evaluate for f64 {
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'m, f64>, ShadeError> {
         material.shade_reference(globals, wo)
+    }
+
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f64; 3],
+    ) -> Result<Bsdf<'m, f64>, ShadeError> {
+        material.flatten_reference(tree, globals, wo)
     }
 }
 

@@ -2,11 +2,14 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod audit;
 mod cost;
 mod eval;
+mod furnace;
 mod input;
 mod lobes;
 mod output;
+mod reciprocity;
 mod render;
 mod reproduce;
 mod sample;
@@ -32,9 +35,9 @@ struct Global {
     /// Set a shader parameter: a number, three numbers `r,g,b`, or a string. Repeatable.
     #[arg(long, global = true, value_name = "NAME=VALUE")]
     set: Vec<String>,
-    /// Accuracy and speed.
-    #[arg(long, global = true, value_enum, default_value = "standard")]
-    tier: TierArg,
+    /// Accuracy and speed; `standard` if not given.
+    #[arg(long, global = true, value_enum)]
+    tier: Option<TierArg>,
     /// How a layer scales what lies below it.
     #[arg(long, global = true, value_enum, default_value = "min")]
     layering: LayeringArg,
@@ -111,11 +114,17 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// Measure random trees of all lobes: does any gain energy?
+    Audit(audit::AuditArgs),
     /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
     Cost {
         /// The script; `-` reads stdin.
         file: PathBuf,
     },
+    /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
+    Furnace(furnace::FurnaceArgs),
+    /// Does the material scatter alike when light and viewer change places?
+    Reciprocity(reciprocity::ReciprocityArgs),
     /// List the closures a script can call.
     Lobes {
         /// Only those of this name.
@@ -133,6 +142,8 @@ enum Failure {
     Script(String),
     /// Wrong usage, or a file that cannot be read or written.
     Usage(String),
+    /// What was checked does not hold.
+    Check(String),
     /// Whoever reads stdout has gone.
     Closed,
 }
@@ -153,7 +164,10 @@ pub fn main() -> ExitCode {
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Audit(args) => audit::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
+        Command::Furnace(args) => furnace::run(&cli.global, args),
+        Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
@@ -167,6 +181,10 @@ pub fn main() -> ExitCode {
         Err(Failure::Usage(message)) => {
             eprintln!("error: {message}");
             ExitCode::from(2)
+        }
+        Err(Failure::Check(message)) => {
+            eprintln!("{message}");
+            ExitCode::from(3)
         }
     }
 }

@@ -40,7 +40,7 @@ pub fn run(global: &Global, file: &Path, explain: bool) -> Outcome {
 
 /// By which rule layers scale what lies below them, and where `balanced` is not to be had, why.
 fn layering(material: &Material) -> Value {
-    let rule = match material.layering() {
+    let rule = match material.layering().rule {
         LayeringRule::Min => "min",
         LayeringRule::View => "view",
         LayeringRule::Balanced => "balanced",

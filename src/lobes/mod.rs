@@ -85,6 +85,12 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
+    /// Never below E_view(ω), on ω's own side: [`albedo_bound`](Lobe::albedo_bound), unless a lobe that is not
+    /// reciprocal has a tighter one.
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        self.albedo_bound(w, curve)
+    }
+
     /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
@@ -181,6 +187,10 @@ macro_rules! lobes {
             #[inline]
             pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
                 match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
+            }
+            /// See [`Lobe::view_bound`].
+            pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+                match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::delta`].
             #[inline]

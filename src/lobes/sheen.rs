@@ -369,6 +369,10 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         [curve.view(w, self.roughness); 3]
     }
 
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        [curve.view_bound(w, self.roughness); 3]
+    }
+
     #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         let bound = curve.bound(w, L::lift(self.roughness));

@@ -3,7 +3,9 @@
 
 use overcoat::Globals;
 use overcoat::albedo::Precision;
-use overcoat::closure::{Bsdf, ClosureTree, Curves, Layering, NodeId, flatten};
+use overcoat::closure::{
+    Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, NodeId, Tables, flatten,
+};
 use overcoat::lobes::LobeKind;
 use overcoat::lobes::registry::{ParamSpec, ParamTy};
 use overcoat::optics::{Scalar, V3};
@@ -15,12 +17,13 @@ pub struct Stack<S: Scalar> {
     pub tree: ClosureTree,
     pub curves: Curves<S>,
     pub layering: Layering,
+    balance: Option<Balance<S>>,
 }
 
 impl<S: Scalar> Stack<S> {
     pub fn new(tree: ClosureTree, precision: Precision) -> Self {
         let curves = Curves::for_tree(&tree, precision);
-        Stack { tree, curves, layering: Layering::default() }
+        Stack { tree, curves, layering: Layering::default(), balance: None }
     }
 
     /// Bakes as for a script that does not know the parameters called `unknown` before it shades.
@@ -34,12 +37,21 @@ impl<S: Scalar> Stack<S> {
             }
             curves.set(site, kind.table(&known), precision);
         }
-        Stack { tree, curves, layering: Layering::default() }
+        Stack { tree, curves, layering: Layering::default(), balance: None }
+    }
+
+    /// Layers as told, with what `balanced` needs.
+    pub fn layered(&mut self, layering: Layering) {
+        let balanced = layering.rule == LayeringRule::Balanced;
+        let solve = || Balancer::with_nodes(32).solve(&self.tree, &Globals::default(), layering.tint, &self.curves);
+        self.balance = balanced.then(solve);
+        self.layering = layering;
     }
 
     pub fn bsdf(&self, wo: [S; 3]) -> Bsdf<'_, S> {
         let wo = V3::new(wo[0], wo[1], wo[2]);
-        flatten(&self.tree, &Globals::default(), wo, self.layering, &self.curves).expect("within budget")
+        let tables = Tables { curves: &self.curves, balance: self.balance.as_ref() };
+        flatten(&self.tree, &Globals::default(), wo, self.layering, tables).expect("within budget")
     }
 }
 

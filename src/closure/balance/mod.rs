@@ -36,7 +36,7 @@ use crate::optics::{Scalar, V3};
 use scales::Scales;
 use solve::{probe_cosine, probes};
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why a lobe below a layer keeps the `min` rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -186,8 +186,11 @@ type KernelKey = (LobeKind, u32, Vec<u32>);
 pub struct Balancer {
     nodes: usize,
     pair_nodes: usize,
-    kernels: HashMap<KernelKey, Option<Arc<Kernel>>>,
+    kernels: Mutex<HashMap<KernelKey, Option<Arc<Kernel>>>>,
 }
+
+/// Kernels kept at a time; a host that composes trees without end starts over.
+const MAX_KERNELS: usize = 2048;
 
 /// Rows over the weight of a top, and over a parameter of it that varies.
 const WEIGHTS: usize = 8;
@@ -196,13 +199,18 @@ const PARAMS: usize = 32;
 impl Balancer {
     /// Tables as fine as the precision asks for.
     pub fn new(precision: Precision) -> Self {
-        let nodes = precision.scale_nodes;
-        Balancer { nodes, pair_nodes: nodes.min(64), kernels: HashMap::new() }
+        Balancer::with_nodes(precision.scale_nodes)
+    }
+
+    /// Tables of `nodes` cosines (at least 8). Coarser ones lose more and gain no more.
+    pub fn with_nodes(nodes: usize) -> Self {
+        let nodes = nodes.max(8);
+        Balancer { nodes, pair_nodes: nodes.min(64), kernels: Mutex::default() }
     }
 
     /// Scales for `tree`, wherever it is shaded with normals and tangents that are equal where those of `globals` are.
     pub fn solve<S: Scalar>(
-        &mut self,
+        &self,
         tree: &ClosureTree,
         globals: &Globals,
         tint: TintRule,
@@ -245,7 +253,7 @@ impl Balancer {
     /// Scales for a material whose trees vary: for each of `pairs` (sites of top and base) whose top is a lobe without
     /// unknowns but its weight and one parameter, and whose base has none but its weight.
     pub fn solve_pairs<S: Scalar>(
-        &mut self,
+        &self,
         sites: &[Construction<'_>],
         pairs: &[(u32, u32)],
         tint: TintRule,
@@ -265,7 +273,7 @@ impl Balancer {
     }
 
     fn solve_pair<S: Scalar>(
-        &mut self,
+        &self,
         sites: &[Construction<'_>],
         top: u32,
         base: u32,
@@ -309,7 +317,7 @@ impl Balancer {
 
     /// The kernel of a lobe, or why it cannot be balanced.
     fn kernel<S: Scalar>(
-        &mut self,
+        &self,
         kind: LobeKind,
         site: u32,
         values: &[f32],
@@ -325,15 +333,32 @@ impl Balancer {
         if !kind.reciprocal(values) {
             return Err(Unbalanced::NotReciprocal);
         }
-        let mut bits: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
-        // The normal turns the frame and leaves f as it is.
-        if let Some(n) = kind.spec().normal_slot() {
-            bits[n..n + 3].fill(0);
+        // Normals turn the frame, and colors that only weigh the lobe leave its means as they are.
+        let mut plain = values.to_vec();
+        let mut at = 0;
+        for p in kind.spec().params {
+            if p.ty == ParamTy::Normal || (p.ty == ParamTy::Color && is_weight(kind, at)) {
+                plain[at..at + p.ty.slots()].fill(1.0);
+            }
+            at += p.ty.slots();
         }
-        bits.push(nodes as u32);
-        let found = self.kernels.entry((kind, site, bits));
-        let kernel = found.or_insert_with(|| Kernel::new(kind, values, curves.of(site), nodes).map(Arc::new));
-        kernel.clone().ok_or(Unbalanced::Crosses)
+        let bits = plain.iter().map(|v| v.to_bits()).chain([nodes as u32]).collect();
+        let key: KernelKey = (kind, site, bits);
+        let known = self.known().get(&key).cloned();
+        let kernel = known.unwrap_or_else(|| {
+            let kernel = Kernel::new(kind, &plain, curves.of(site), nodes).map(Arc::new);
+            let mut kernels = self.known();
+            if kernels.len() >= MAX_KERNELS {
+                kernels.clear();
+            }
+            kernels.insert(key, kernel.clone());
+            kernel
+        });
+        kernel.ok_or(Unbalanced::Crosses)
+    }
+
+    fn known(&self) -> MutexGuard<'_, HashMap<KernelKey, Option<Arc<Kernel>>>> {
+        self.kernels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -393,7 +418,7 @@ struct Planner<'a, S: Scalar> {
     curves: &'a Curves<S>,
     chain: Chain<S>,
     lobes: Vec<(LobeKind, Planned)>,
-    balancer: &'a mut Balancer,
+    balancer: &'a Balancer,
 }
 
 impl<S: Scalar> Visitor<S> for Planner<'_, S> {
