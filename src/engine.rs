@@ -74,6 +74,10 @@ impl Engine {
         Engine { layering: Layering { tint, ..self.layering }, ..self }
     }
 
+    pub(crate) fn layering_of(&self) -> Layering {
+        self.layering
+    }
+
     /// Compiles a script. `name` names it in messages, and the shader if the script does not.
     ///
     /// # Errors
@@ -105,6 +109,14 @@ impl Shader {
     /// The declared parameters, in order.
     pub fn params(&self) -> &[ParamDecl] {
         self.checked.params()
+    }
+
+    pub(crate) fn engine(&self) -> Engine {
+        self.engine
+    }
+
+    pub(crate) fn checked(&self) -> &CheckedShader {
+        &self.checked
     }
 
     /// The script, for showing messages.

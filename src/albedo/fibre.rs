@@ -119,6 +119,30 @@ impl<S: Real> FibreTables<S> {
         self.read(&self.bound, w, t)
     }
 
+    /// The largest bound per component over all directions and the varying parameter: that of a node.
+    pub fn highest(&self) -> [f64; COMPONENTS]
+    where
+        S: Scalar,
+    {
+        let mut highest = [0.0f64; COMPONENTS];
+        let plane = self.sheets * self.rows * self.nodes;
+        for (highest, chunk) in highest.iter_mut().zip(self.bound.chunks(plane.max(1))) {
+            *highest = chunk.iter().fold(0.0, |a, b| a.max(b.to_f64()));
+        }
+        highest
+    }
+
+    /// The directions of the nodes, of one row where the rows are a parameter's.
+    pub fn directions(&self) -> impl Iterator<Item = V3<f64>> {
+        let (sheets, rows, nodes) = (self.sheets, self.rows, self.nodes);
+        let around = self.axis.is_none() && rows > 1;
+        (0..sheets * rows * nodes).map(move |k| {
+            let (sheet, row, node) = (k / (rows * nodes), k % (rows * nodes) / nodes, k % nodes);
+            let row = if around { row as f64 / (rows - 1) as f64 } else { 1.0 };
+            direction(sheet, row, node as f64 / (nodes.max(2) - 1) as f64)
+        })
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
         (self.view.len() + self.bound.len()) * size_of::<S>()
@@ -215,6 +239,15 @@ impl FibreSpec {
     }
 }
 
+/// Where the fractions `row` and `node` of a table lie: square roots of diamond angles.
+fn direction(sheet: usize, row: f64, node: f64) -> V3<f64> {
+    let (along, around) = (node.powi(2).max(1e-9), row.powi(2));
+    let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
+    let (cos, sin) = unit(along, 1.0 - along);
+    let (z, y) = unit(around.max(1e-12), 1.0 - around);
+    V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
+}
+
 /// The nodes of a table and how to integrate there; fractional indices lie between nodes.
 struct Grid<'s> {
     spec: &'s FibreSpec,
@@ -230,15 +263,11 @@ impl Grid<'_> {
 
     /// The direction at a node; just above the horizon in place of the horizon itself.
     fn direction(&self, sheet: usize, row: f64, node: f64) -> V3<f64> {
-        let along = (node / (self.nodes - 1) as f64).powi(2).max(1e-9);
         let around = match self.spec.axis {
-            None if self.rows > 1 => (row / (self.rows - 1) as f64).powi(2),
+            None if self.rows > 1 => row / (self.rows - 1) as f64,
             _ => 1.0,
         };
-        let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
-        let (cos, sin) = unit(along, 1.0 - along);
-        let (z, y) = unit(around.max(1e-12), 1.0 - around);
-        V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
+        direction(sheet, around, node / (self.nodes - 1) as f64)
     }
 
     fn albedos(&self, sheet: usize, row: f64, node: f64) -> [f64; COMPONENTS] {

@@ -2,6 +2,7 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod check;
 mod cost;
 mod eval;
 mod input;
@@ -106,6 +107,8 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// Prove that scripts keep energy for all parameters in their ranges and all directions, or show where one gains.
+    Check(check::CheckArgs),
     /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
     Cost {
         /// The script; `-` reads stdin.
@@ -128,6 +131,8 @@ enum Failure {
     Script(String),
     /// Wrong usage, or a file that cannot be read or written.
     Usage(String),
+    /// All has been said; the exit status is left.
+    Status(u8),
     /// Whoever reads stdout has gone.
     Closed,
 }
@@ -148,6 +153,7 @@ pub fn main() -> ExitCode {
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
@@ -155,6 +161,7 @@ pub fn main() -> ExitCode {
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
+        Err(Failure::Status(status)) => ExitCode::from(status),
         Err(Failure::Script(messages)) => {
             eprintln!("{}", messages.trim_end());
             ExitCode::from(1)

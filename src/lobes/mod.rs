@@ -15,6 +15,7 @@ pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
+pub mod limits;
 mod ltc_tables;
 pub mod microcylinder;
 pub mod oren_nayar;
@@ -26,6 +27,7 @@ pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
+use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
 /// A value per colour channel.
@@ -82,6 +84,19 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
+    /// How small and how large the albedo may be over whole ranges of parameters, `(lowest, highest)` per slot as given
+    /// (not yet clamped), and of cosines to the lobe's normal. `None`: to be read off the table.
+    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        let _ = (ranges, cos);
+        None
+    }
+
+    /// The first slot of a color that the albedo is at most proportional to: the lobe's [`weight`](Lobe::weight), or a
+    /// reflectance that bounds it. [`limits`](Lobe::limits) leaves it out.
+    fn tint_slot() -> Option<usize> {
+        None
+    }
+
     /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
@@ -120,6 +135,15 @@ macro_rules! lobes {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
                 } ),* }
+            }
+
+            fn closed_limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::limits(ranges, cos) ),* }
+            }
+
+            /// See [`Lobe::tint_slot`].
+            pub fn tint_slot(self) -> Option<usize> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot() ),* }
             }
 
             /// The color that multiplies a lobe with these parameter values.
@@ -193,6 +217,11 @@ impl LobeKind {
     /// Whether the lobe scatters, transmits in one direction, or emits.
     pub fn class(self) -> LobeClass {
         self.spec().class
+    }
+
+    /// Between what the albedo lies over ranges of parameters and of cosines: see [`Lobe::limits`].
+    pub fn limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Limits {
+        self.closed_limits(ranges, cos).unwrap_or_else(|| limits::of_table(self, ranges, cos))
     }
 
     /// The lobe called `name`.
