@@ -115,6 +115,10 @@ impl Engine {
         Ok(Engine { hosts, ..self })
     }
 
+    pub(crate) fn layering_of(&self) -> Layering {
+        self.layering
+    }
+
     /// Compiles a script. `name` names it in messages, and the shader if the script does not.
     ///
     /// # Errors
@@ -148,6 +152,14 @@ impl Shader {
     /// The declared parameters, in order.
     pub fn params(&self) -> &[ParamDecl] {
         self.checked.params()
+    }
+
+    pub(crate) fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    pub(crate) fn checked(&self) -> &CheckedShader {
+        &self.checked
     }
 
     /// The script, for showing messages.

@@ -16,12 +16,13 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
     ("audit", &["engine", "ir", "closure", "lobes", "albedo", "optics", "globals"]),
     ("engine", &["ir", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
+    ("prove", &["ir", "closure", "lobes", "audit", "optics", "engine", "diag", "span", "globals"]),
     ("preview", &["engine", "closure", "lobes", "globals"]),
     (
         "cli",
         &[
-            "engine", "preview", "audit", "closure", "lobes", "albedo", "optics", "ir", "syntax", "diag", "span",
-            "globals",
+            "engine", "prove", "preview", "audit", "closure", "lobes", "albedo", "optics", "ir", "syntax", "diag",
+            "span", "globals",
         ],
     ),
 ];

@@ -159,6 +159,39 @@ impl<S: Real> AlbedoCurve<S> {
         &self.extra
     }
 
+    /// The smallest E_view and the largest bound at the nodes around a range of cosines and of the varying parameter:
+    /// between nodes both are interpolated, so that nothing lies outside. (0, 0) below the surface.
+    pub fn range(&self, cos: (f64, f64), parameter: (f64, f64)) -> (f64, f64)
+    where
+        S: Scalar,
+    {
+        if self.view.is_empty() || cos.1 <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let nodes = |lo: f64, hi: f64, count: usize| {
+            let last = (count - 1) as f64;
+            // A hair wider: the reading type may round into the next cell.
+            let at = |x: f64, slack: f64| (x * last + slack).clamp(0.0, last);
+            at(lo, -1e-3).floor() as usize..=at(hi, 1e-3).ceil() as usize
+        };
+        let x = |c: f64| c.clamp(0.0, 1.0).sqrt().sqrt();
+        let y = |p: f64| (p.max(0.0).sqrt() - self.lo.to_f64()) * self.inv_range.to_f64();
+        let rows = if self.rows == 1 {
+            0..=0
+        } else {
+            nodes(y(parameter.0).clamp(0.0, 1.0), y(parameter.1).clamp(0.0, 1.0), self.rows)
+        };
+        let (mut lowest, mut highest) = (f64::INFINITY, 0.0f64);
+        for row in rows {
+            for node in nodes(x(cos.0), x(cos.1), self.cos_nodes) {
+                let at = row * self.cos_nodes + node;
+                lowest = lowest.min(self.view[at].to_f64());
+                highest = highest.max(self.bound[at].to_f64());
+            }
+        }
+        (if cos.0 >= 0.0 { lowest } else { 0.0 }, highest)
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
         [&self.view, &self.bound, &self.view_bound, &self.excess, &self.extra].map(Vec::len).iter().sum::<usize>()

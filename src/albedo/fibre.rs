@@ -142,6 +142,30 @@ impl<S: Real> FibreTables<S> {
         self.read(&self.bound, w, t)
     }
 
+    /// The largest bound per component over all directions and the varying parameter: that of a node.
+    pub fn highest(&self) -> [f64; COMPONENTS]
+    where
+        S: Scalar,
+    {
+        let mut highest = [0.0f64; COMPONENTS];
+        let plane = self.sheets * self.rows * self.nodes;
+        for (highest, chunk) in highest.iter_mut().zip(self.bound.chunks(plane.max(1))) {
+            *highest = chunk.iter().fold(0.0, |a, b| a.max(b.to_f64()));
+        }
+        highest
+    }
+
+    /// The directions of the nodes, of one row where the rows are a parameter's.
+    pub fn directions(&self) -> impl Iterator<Item = V3<f64>> {
+        let (sheets, rows, nodes) = (self.sheets, self.rows, self.nodes);
+        let around = self.axis.is_none() && rows > 1;
+        (0..sheets * rows * nodes).map(move |k| {
+            let (sheet, row, node) = (k / (rows * nodes), k % (rows * nodes) / nodes, k % nodes);
+            let row = if around { row as f64 / (rows - 1) as f64 } else { 1.0 };
+            direction(sheet, row, node as f64 / (nodes.max(2) - 1) as f64, self.crossed)
+        })
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
         (self.view.len() + self.bound.len()) * size_of::<S>()
@@ -247,6 +271,22 @@ impl FibreSpec {
     }
 }
 
+/// Where the fractions `row` and `place` along a node's row lie: square roots of diamond angles, for crossed threads
+/// from both ends.
+fn direction(sheet: usize, row: f64, place: f64, crossed: bool) -> V3<f64> {
+    // A cloth's f is a quotient of small numbers at its horizons, and has to stay away from their limits.
+    let (along, least) = match crossed {
+        true if place < 0.5 => ((2.0 * place * place).max(1e-5), 1e-5),
+        true => (1.0 - 2.0 * (1.0 - place).powi(2), 1e-5),
+        false => (place.powi(2).max(1e-9), 1e-12),
+    };
+    let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
+    let (cos, sin) = unit(along, 1.0 - along);
+    let around = row.powi(2);
+    let (z, y) = unit(around.max(least), 1.0 - around);
+    V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
+}
+
 /// The nodes of a table and how to integrate there; fractional indices lie between nodes.
 struct Grid<'s> {
     spec: &'s FibreSpec,
@@ -262,21 +302,11 @@ impl Grid<'_> {
 
     /// The direction at a node; just above the horizon in place of the horizon itself.
     fn direction(&self, sheet: usize, row: f64, node: f64) -> V3<f64> {
-        let place = node / (self.nodes - 1) as f64;
         let around = match self.spec.axis {
-            None if self.rows > 1 => (row / (self.rows - 1) as f64).powi(2),
+            None if self.rows > 1 => row / (self.rows - 1) as f64,
             _ => 1.0,
         };
-        // A cloth's f is a quotient of small numbers there, and has to stay away from their limits.
-        let (along, least) = match self.spec.weave {
-            Some(_) if place < 0.5 => ((2.0 * place * place).max(1e-5), 1e-5),
-            Some(_) => (1.0 - 2.0 * (1.0 - place).powi(2), 1e-5),
-            None => (place.powi(2).max(1e-9), 1e-12),
-        };
-        let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
-        let (cos, sin) = unit(along, 1.0 - along);
-        let (z, y) = unit(around.max(least), 1.0 - around);
-        V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
+        direction(sheet, around, node / (self.nodes - 1) as f64, self.spec.weave.is_some())
     }
 
     fn albedos(&self, sheet: usize, row: f64, node: f64) -> [f64; COMPONENTS] {

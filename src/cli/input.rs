@@ -51,6 +51,14 @@ impl Global {
 
     /// Sets the parameters of `--set`, then those of `more`.
     pub fn specialise(&self, shader: &Shader, more: &[(String, String)]) -> Result<Material, Failure> {
+        let values = self.values(shader, more)?;
+        let material = shader.material(&values).map_err(|e| self.setting_failed(&e.diagnostics, shader.source()))?;
+        self.warn(material.warnings(), shader.source());
+        Ok(material)
+    }
+
+    /// The values of `--set`, then those of `more`, as the types the parameters have.
+    pub fn values(&self, shader: &Shader, more: &[(String, String)]) -> Result<Vec<(String, Value)>, Failure> {
         let mut set = Vec::new();
         for given in &self.set {
             let (name, text) = name_and_value(given)?;
@@ -66,13 +74,11 @@ impl Global {
             };
             values.push((name, value));
         }
-        let material = shader.material(&values).map_err(|e| self.setting_failed(&e.diagnostics, shader.source()))?;
-        self.warn(material.warnings(), shader.source());
-        Ok(material)
+        Ok(values)
     }
 
     /// Wrong names and types in `--set` are wrong usage; anything else is the script's fault.
-    fn setting_failed(&self, diagnostics: &[Diagnostic], source: &Source) -> Failure {
+    pub fn setting_failed(&self, diagnostics: &[Diagnostic], source: &Source) -> Failure {
         if diagnostics.iter().all(|d| d.code.starts_with("E04")) {
             let lines = diagnostics.iter().map(|d| {
                 let help = d.help.iter().map(|h| format!("; {h}")).collect::<String>();
@@ -96,12 +102,12 @@ impl From<ShadeError> for Failure {
     }
 }
 
-fn stderr_has_color() -> bool {
+pub fn stderr_has_color() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
 /// The script's name for messages, and its text.
-fn read(path: &Path) -> Result<(String, String), Failure> {
+pub fn read(path: &Path) -> Result<(String, String), Failure> {
     let (name, bytes) = if path == Path::new("-") {
         let mut bytes = Vec::new();
         std::io::stdin().read_to_end(&mut bytes).map_err(|e| Failure::usage(format!("cannot read stdin: {e}")))?;

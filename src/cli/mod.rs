@@ -3,6 +3,7 @@
 
 mod albedo;
 mod audit;
+mod check;
 mod cost;
 mod eval;
 mod furnace;
@@ -116,6 +117,8 @@ enum Command {
     Albedo(albedo::AlbedoArgs),
     /// Measure random trees of all lobes: does any gain energy?
     Audit(audit::AuditArgs),
+    /// Prove that scripts keep energy for all parameters in their ranges and all directions, or show where one gains.
+    Check(check::CheckArgs),
     /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
     Cost {
         /// The script; `-` reads stdin.
@@ -144,6 +147,8 @@ enum Failure {
     Usage(String),
     /// What was checked does not hold.
     Check(String),
+    /// All has been said; the exit status is left.
+    Status(u8),
     /// Whoever reads stdout has gone.
     Closed,
 }
@@ -165,6 +170,7 @@ pub fn main() -> ExitCode {
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
         Command::Audit(args) => audit::run(&cli.global, args),
+        Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Furnace(args) => furnace::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
@@ -174,6 +180,7 @@ pub fn main() -> ExitCode {
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
+        Err(Failure::Status(status)) => ExitCode::from(status),
         Err(Failure::Script(messages)) => {
             eprintln!("{}", messages.trim_end());
             ExitCode::from(1)

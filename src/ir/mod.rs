@@ -5,12 +5,12 @@
 //! reads is dropped, and what remains is a list of register instructions that [`Program::shade`] runs at a point.
 //! This module knows closures by their signatures only; what a lobe does with light is never seen here.
 
-mod body;
-mod builtins;
+pub(crate) mod body;
+pub(crate) mod builtins;
 mod check;
 mod functions;
 mod lower;
-mod ops;
+pub(crate) mod ops;
 mod pairs;
 mod passes;
 mod program;

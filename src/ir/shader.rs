@@ -52,7 +52,7 @@ impl Value {
         }
     }
 
-    pub(super) fn from_cells(ty: Ty, cells: Cells, strings: &[String]) -> Value {
+    pub(crate) fn from_cells(ty: Ty, cells: Cells, strings: &[String]) -> Value {
         let triple = cells.map(f32::from_bits);
         match ty {
             Ty::Int => Value::Int(cells[0] as i32),
@@ -66,7 +66,7 @@ impl Value {
     }
 
     /// The bits of this value as a `ty`, if it can be one.
-    fn to_cells(&self, ty: Ty, strings: &mut Vec<String>) -> Option<Cells> {
+    pub(crate) fn to_cells(&self, ty: Ty, strings: &mut Vec<String>) -> Option<Cells> {
         match (self, ty) {
             (Value::Int(i), Ty::Int) => Some([*i as u32, 0, 0]),
             (Value::Float(x), Ty::Int) if x.fract() == 0.0 && x.abs() < 2e9 => Some([*x as i32 as u32, 0, 0]),
@@ -106,7 +106,7 @@ pub struct ParamDecl {
     pub metadata: Vec<(String, Value)>,
     /// Where its name stands.
     pub span: Span,
-    pub(super) var: VarId,
+    pub(crate) var: VarId,
 }
 
 impl ParamDecl {
@@ -120,10 +120,10 @@ impl ParamDecl {
 #[derive(Clone, Debug)]
 pub struct CheckedShader {
     pub(super) name: String,
-    pub(super) span: Span,
+    pub(crate) span: Span,
     pub(super) params: Vec<ParamDecl>,
     pub(super) metadata: Vec<(String, Value)>,
-    pub(super) body: Body,
+    pub(crate) body: Body,
 }
 
 impl CheckedShader {
@@ -196,7 +196,7 @@ impl CheckedShader {
         lower::lower(&body, &needs::needs(&body), Vec::new())
     }
 
-    fn unknown_parameter(&self, name: &str) -> Diagnostic {
+    pub(crate) fn unknown_parameter(&self, name: &str) -> Diagnostic {
         let d = Diagnostic::error("E0401", self.span, format!("`{}` has no parameter `{name}`", self.name));
         let names = || self.params.iter().map(|p| p.name.as_str());
         match suggest(name, names()) {

@@ -17,6 +17,7 @@ pub mod emission;
 pub mod eon;
 pub mod fabric;
 pub mod host;
+pub mod limits;
 mod ltc_tables;
 pub mod microcylinder;
 pub mod microcylinder_threads;
@@ -29,6 +30,7 @@ pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
+use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
 /// A value per colour channel.
@@ -91,6 +93,19 @@ pub trait Lobe<S: Real>: Sized + Copy {
         self.albedo_bound(w, curve)
     }
 
+    /// How small and how large the albedo may be over whole ranges of parameters, `(lowest, highest)` per slot as given
+    /// (not yet clamped), and of cosines to the lobe's normal. `None`: to be read off the table.
+    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        let _ = (ranges, cos);
+        None
+    }
+
+    /// The first slot of a color that the albedo is at most proportional to: the lobe's [`weight`](Lobe::weight), or a
+    /// reflectance that bounds it. [`limits`](Lobe::limits) leaves it out.
+    fn tint_slot() -> Option<usize> {
+        None
+    }
+
     /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
@@ -135,6 +150,18 @@ macro_rules! lobes {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
                 }, )* LobeKind::Host(host) => host.spec().reciprocal }
+            }
+
+            fn closed_limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+                match self {
+                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::limits(ranges, cos), )*
+                    LobeKind::Host(host) => Some(Limits { lowest: 0.0, highest: host.albedo_at_most().into() }),
+                }
+            }
+
+            /// See [`Lobe::tint_slot`].
+            pub fn tint_slot(self) -> Option<usize> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
             }
 
             /// The color that multiplies a lobe with these parameter values.
@@ -236,6 +263,11 @@ impl LobeKind {
         let lobe = AnyLobe::<f64>::new(self, &values, wo, &curve);
         let below = |cos: f64| lobe.f(V3::polar(-cos, 0.4), &curve).iter().any(|f| *f > 0.0);
         lobe.delta().is_some_and(|(wi, _)| wi.z < 0.0) || [0.1, 0.5, 0.9].into_iter().any(below)
+    }
+
+    /// Between what the albedo lies over ranges of parameters and of cosines: see [`Lobe::limits`].
+    pub fn limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Limits {
+        self.closed_limits(ranges, cos).unwrap_or_else(|| limits::of_table(self, ranges, cos))
     }
 
     /// The lobe called `name`.

@@ -336,6 +336,10 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         })
     }
 
+    fn tint_slot() -> Option<usize> {
+        SheenParams::SPEC.slot_of("albedo")
+    }
+
     fn weight(params: &SheenParams) -> [f32; 3] {
         params.albedo
     }
