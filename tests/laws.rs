@@ -11,12 +11,24 @@ use overcoat::lobes::{AnyLobe, LobeKind, forms};
 use overcoat::optics::{F32x8, Scalar, V3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
-fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Stack<S> {
-    let mut tree = ClosureTree::new();
-    let lobe = tree.lobe(kind, 0, values);
-    tree.set_root(lobe);
-    Stack::new(tree, Precision::STANDARD)
+/// A lobe on its own; what is baked for one test serves the others.
+fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Arc<Stack<S>> {
+    type Shared = Arc<dyn Any + Send + Sync>;
+    type Key = (TypeId, &'static str, Vec<u32>);
+    static STACKS: LazyLock<Mutex<HashMap<Key, Arc<OnceLock<Shared>>>>> = LazyLock::new(Mutex::default);
+    let key = (TypeId::of::<S>(), kind.spec().name, values.iter().map(|v| v.to_bits()).collect());
+    let entry = STACKS.lock().expect("no test panics here").entry(key).or_default().clone();
+    let shared = entry.get_or_init(|| {
+        let mut tree = ClosureTree::new();
+        let lobe = tree.lobe(kind, 0, values);
+        tree.set_root(lobe);
+        Arc::new(Stack::<S>::new(tree, Precision::STANDARD))
+    });
+    shared.clone().downcast().expect("keyed by its type")
 }
 
 /// Every lobe with a spread of parameter blocks.

@@ -5,7 +5,8 @@
 
 pub mod curve;
 pub mod fibre;
+mod panels;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
-pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, Ridges, TableSpec};
+pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, OFFSETS, Ridges, TableSpec};

@@ -110,7 +110,7 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         let mut rng = Pcg64Mcg::seed_from_u64(1);
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
         sets.push(free.iter().map(|p| p.default[0]).collect());
-        sets.extend((0..3).map(|_| choices.iter().map(|c| c[rng.random_range(0..c.len())]).collect::<Vec<_>>()));
+        sets.extend((0..5).map(|_| choices.iter().map(|c| c[rng.random_range(0..c.len())]).collect::<Vec<_>>()));
     } else if choices.len() > 3 {
         // One at a time, the others at their defaults; and all at either end.
         let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
