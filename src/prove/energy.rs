@@ -194,6 +194,8 @@ impl<'a> Energy<'a> {
             }
             Held::LightOf(_) => 0.0,
         };
+        // No number becomes the parameter's default.
+        let tint = tint.filter(|tint| tint.iter().all(|t| !path.number(*t).range.nan));
         let constant = |x: f64| [0; 3].map(|_| Poly::constant(x));
         let bound = Bound { most: constant(highest), least: constant(limits.lowest), error: 0.0 };
         match tint {
@@ -444,6 +446,15 @@ pub fn reachable(graph: &Graph, root: Cid) -> Vec<Cid> {
         }
     }
     found
+}
+
+/// All slots of lobes below `root`, directions too.
+pub fn slots_of(graph: &Graph, root: Cid) -> Vec<Id> {
+    let slots = |id: Cid| match graph.closure_at(id) {
+        Closure::Lobe(_, slots, _) => slots.clone(),
+        _ => Vec::new(),
+    };
+    reachable(graph, root).into_iter().flat_map(slots).collect()
 }
 
 /// The numbers that closures below `root` depend on: weights, slots that are no directions, conditions.

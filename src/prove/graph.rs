@@ -144,16 +144,13 @@ pub struct Graph {
     /// What is free.
     pub leaves: Vec<Leaf>,
     closures: Vec<(Closure, Span)>,
-    /// For each number the leaves it depends on, as long as they are few.
+    /// For each number the leaves it depends on.
     support: Vec<Vec<u32>>,
     /// Where numbers were first written.
     places: Vec<Span>,
     /// Where the expression at hand was written.
     pub here: Span,
 }
-
-/// Supports longer than this are cut: what depends on so much is split as a whole.
-const MAX_SUPPORT: usize = 24;
 
 impl Graph {
     /// An empty graph; its first closure is black.
@@ -263,7 +260,6 @@ impl Graph {
         }
         support.sort_unstable();
         support.dedup();
-        support.truncate(MAX_SUPPORT);
         self.nodes.push(node);
         self.support.push(support);
         self.places.push(self.here);

@@ -1,7 +1,7 @@
 //! Branch and bound: a region whose bound is too large is halved, along the variable that helps most, until every part
 //! is bounded or the effort is spent. Deterministic: effort is counted in operations, not in seconds.
 
-use super::energy::{Detail, Energy, Held, Loose, numbers_of};
+use super::energy::{Detail, Energy, Held, Loose, numbers_of, slots_of};
 use super::graph::{Cid, Graph, Id, LeafKind, Node};
 use super::interval::Interval;
 use super::light;
@@ -80,7 +80,9 @@ impl<'a> Problem<'a> {
         let leaves: Vec<u32> = leaves.into_iter().collect();
         let kind = |l: &u32| graph.leaves[*l as usize].kind;
         let view = |l: &u32| matches!(kind(l), LeafKind::Facing | LeafKind::Global(GlobalVar::I, _));
-        let looks_at_view = leaves.iter().any(view);
+        // A normal that turns with the view is reason enough.
+        let turned = slots_of(graph, root).into_iter().any(|id| graph.support(id).iter().any(view));
+        let looks_at_view = turned || leaves.iter().any(view);
         let from_n = energy.normal().is_none_or(|n| super::trace::global_of(graph, n) == Some(GlobalVar::N));
         Problem { graph, root, energy, leaves, looks_at_view, facing_held: from_n }
     }
