@@ -243,8 +243,8 @@ mod command {
         assert_eq!(status(&["examples/velvet.osl"]), Some(0));
         assert_eq!(status(&["tests/corpus/energy/twice.osl"]), Some(3));
         assert_eq!(status(&["tests/corpus/err/names.osl", "tests/corpus/energy/twice.osl"]), Some(1));
-        assert_eq!(status(&["examples/shot_silk.osl", "--set", "weave=linen"]), Some(3));
-        assert_eq!(status(&["examples/shot_silk.osl", "--set", "weave=linen", "--allow-undecided"]), Some(0));
+        assert_eq!(status(&["examples/shot_silk.osl", "--set", "weave=shot_silk"]), Some(3));
+        assert_eq!(status(&["examples/shot_silk.osl", "--set", "weave=shot_silk", "--allow-undecided"]), Some(0));
         assert_eq!(status(&["examples/velvet.osl", "--set", "rouhgness=1"]), Some(2));
         assert_eq!(status(&["examples/velvet.osl", "--range", "roughness=1,0"]), Some(2));
         assert_eq!(status(&["nowhere.osl"]), Some(2));
