@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Not decided, with the reason.
 const UNDECIDED: &[(&str, &str)] = &[
-    // 1.6 times the lightest weave comes to 0.993; the tables of woven cloth are lifted by 1 % for their kinks.
-    ("shot_silk", "1.6 × the bound of a lobe that is known to 1 %"),
+    // 1.6 times silk crêpe comes to 0.98; its table is lifted much where the threads point at the viewer.
+    ("shot_silk", "1.6 × the bound of a lobe that is loose about one direction"),
 ];
 
 fn scripts(folder: &str) -> Vec<PathBuf> {

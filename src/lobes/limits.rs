@@ -234,14 +234,14 @@ mod tests {
         for t in [0.0, 0.7] {
             let values = block(t);
             let known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
-            let table = kind.table(&known).map_or_else(AlbedoCurve::default, |s| s.bake::<f32>(Precision::FAST));
+            let table = kind.table(&known).map_or_else(AlbedoCurve::default, |s| s.bake::<f32>(Precision::STANDARD));
             let lobe = AnyLobe::new(kind, &values, V3::new(0.0, 0.0, 1.0), &table);
             for k in 0..40 {
                 let mu = ((k as f32 + 0.5) / 40.0).powi(3);
                 let bound = lobe.albedo_bound(V3::polar(mu, 0.7 * k as f32), &table)[0] as f64;
                 let limits = kind.limits(&ranges, (mu as f64 * 0.9, (mu as f64 * 1.1).min(1.0)));
-                // Tables of another precision are lifted by other amounts.
-                assert!(bound <= limits.highest + 1e-2, "{kind:?} {values:?} {mu}: {bound} above {limits:?}");
+                // Tables in another precision are lifted by other amounts.
+                assert!(bound <= limits.highest + 2e-3, "{kind:?} {values:?} {mu}: {bound} above {limits:?}");
                 assert!(bound >= limits.lowest, "{kind:?} {values:?} {mu}: {bound} below {limits:?}");
             }
         }
