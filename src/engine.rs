@@ -382,10 +382,10 @@ fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, pre
         return balancer.solve(&tree, &globals, tint, curves);
     }
     // Where the view changes the tree no scale is symmetric.
-    let pairs = if program.globals().contains(&GlobalVar::I) { vec![] } else { program.layer_pairs() };
+    let pairs = if program.globals().contains(&GlobalVar::I) { &[] } else { program.layer_pairs() };
     let sites = program.sites();
     let sites: Vec<_> = sites.iter().map(|s| Construction { kind: s.kind, values: &s.values }).collect();
-    balancer.solve_pairs(&sites, &pairs, tint, curves)
+    balancer.solve_pairs(&sites, pairs, tint, curves)
 }
 
 /// What is wrong with a script.

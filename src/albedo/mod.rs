@@ -3,6 +3,7 @@
 //! In: a lobe's f as a plain function, in double precision. Out: [`AlbedoCurve`], read in shading. Knows no lobe by
 //! name.
 
+mod bends;
 pub mod curve;
 pub mod fibre;
 mod panels;

@@ -11,7 +11,6 @@ mod check;
 mod functions;
 mod lower;
 pub(crate) mod ops;
-mod pairs;
 mod passes;
 mod program;
 mod shader;

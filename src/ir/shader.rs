@@ -1,9 +1,9 @@
 //! A checked shader and its parameters, and how to fix them.
 
-use super::body::{Body, Cells, VarId};
+use super::body::{Body, Cells, ExprKind, VarId};
 use super::check::suggest;
 use super::lower;
-use super::passes::{dead, fold, needs};
+use super::passes::{dead, fold, layers, needs};
 use super::program::Program;
 use super::types::Ty;
 use crate::diag::Diagnostic;
@@ -175,11 +175,13 @@ impl CheckedShader {
             return Err(needs.errors);
         }
         let mut program = lower::lower(&body, &needs, warnings);
-        for top in program.tops() {
-            let site = &program.sites[top as usize];
-            if site.kind.transmits() {
-                let message = format!("what `{}` transmits counts as spent in a top", site.kind.spec().name);
-                let d = Diagnostic::warning("W0504", site.span, message);
+        for top in layers::layers(&body).tops() {
+            let expr = body.expr(top);
+            if let ExprKind::Lobe(kind, _) = expr.kind
+                && kind.transmits()
+            {
+                let message = format!("what `{}` transmits counts as spent in a top", kind.spec().name);
+                let d = Diagnostic::warning("W0504", expr.span, message);
                 program
                     .warnings
                     .push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
