@@ -5,7 +5,7 @@
 //! takes the place where its operands began. `&&`, `||` and `? :` become jumps.
 
 use super::body::{Body, ExprId, ExprKind, Op, Root, Stmt, VarId};
-use super::passes::layers;
+use super::passes::layers::Layers;
 use super::passes::needs::Needs;
 use super::program::{Instr, Program, Site};
 use super::types::Ty;
@@ -13,13 +13,12 @@ use crate::diag::Diagnostic;
 use std::collections::HashMap;
 
 /// Lowers a body whose live expressions are marked in `needs`.
-pub fn lower(body: &Body, needs: &Needs, warnings: Vec<Diagnostic>) -> Program {
+pub fn lower(body: &Body, needs: &Needs, layers: &Layers, warnings: Vec<Diagnostic>) -> Program {
     let mut lower = Lower::new(body, needs);
     lower.block(&body.stmts);
     let strings = body.strings.clone();
     let site = |id: ExprId| lower.site_of.get(&id.0).copied();
-    let pairs = layers::layers(body).pairs();
-    let layer_pairs = pairs.into_iter().filter_map(|(top, base)| Some((site(top)?, site(base)?))).collect();
+    let layer_pairs = layers.pairs().into_iter().filter_map(|(top, base)| Some((site(top)?, site(base)?))).collect();
     Program {
         code: lower.code,
         args: lower.args,

@@ -174,20 +174,18 @@ impl CheckedShader {
         if !needs.errors.is_empty() {
             return Err(needs.errors);
         }
-        let mut program = lower::lower(&body, &needs, warnings);
-        for top in layers::layers(&body).tops() {
+        let layers = layers::layers(&body);
+        for top in layers.tops() {
             let expr = body.expr(top);
             if let ExprKind::Lobe(kind, _) = expr.kind
                 && kind.transmits()
             {
                 let message = format!("what `{}` transmits counts as spent in a top", kind.spec().name);
                 let d = Diagnostic::warning("W0504", expr.span, message);
-                program
-                    .warnings
-                    .push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
+                warnings.push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
             }
         }
-        Ok(program)
+        Ok(lower::lower(&body, &needs, &layers, warnings))
     }
 
     /// The program with every parameter left open: read from memory at every point instead of folded away. What
@@ -195,7 +193,7 @@ impl CheckedShader {
     pub fn unspecialised(&self) -> Program {
         let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
         let body = dead::remove(fold::fold_open(&self.body, &open));
-        lower::lower(&body, &needs::needs(&body), Vec::new())
+        lower::lower(&body, &needs::needs(&body), &layers::layers(&body), Vec::new())
     }
 
     pub(crate) fn unknown_parameter(&self, name: &str) -> Diagnostic {

@@ -18,10 +18,12 @@
 
 use super::cloth_range;
 use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
-use super::{Rgb, Rgb32};
+use super::registry::ClosureParams;
+use super::{Lobe, Rgb, Rgb32};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, Ridges, TableSpec};
 use crate::optics::{F32x8, Lift, Real, V3, sampling};
 use std::f64::consts::PI;
+use std::marker::PhantomData;
 
 /// Tangents per family.
 pub const TANGENTS: usize = 5;
@@ -463,6 +465,56 @@ fn symmetric(y: &Yarn) -> bool {
 fn offsets(y: &Yarn) -> [f64; TANGENTS] {
     let step = (y.hi - y.lo) as f64 / (TANGENTS - 1) as f64;
     std::array::from_fn(|k| (y.lo as f64 + step * k as f64).to_radians())
+}
+
+/// The parameters of a closure that is a cloth.
+pub trait ClothParams: ClosureParams {
+    /// See [`Lobe::table`].
+    fn table(values: &[Option<f32>]) -> Option<TableSpec>;
+    /// The two families of threads.
+    fn yarns(&self) -> [Yarn; 2];
+}
+
+/// The lobe of a cloth whose threads follow from `P`.
+#[derive(Clone, Copy, Debug)]
+pub struct Woven<S, P> {
+    cloth: Cloth<S>,
+    params: PhantomData<P>,
+}
+
+impl<S: Real, P: ClothParams> Lobe<S> for Woven<S, P> {
+    type Params = P;
+
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        P::table(values)
+    }
+
+    fn new(params: &P, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        Woven { cloth: Cloth::new(&params.yarns(), wo, curve), params: PhantomData }
+    }
+
+    #[inline(always)]
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        self.cloth.f(wi, curve)
+    }
+
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        self.cloth.pdf(wi)
+    }
+
+    fn sample(&self, u: [S; 2]) -> V3<S> {
+        self.cloth.sample(u)
+    }
+
+    /// Exact where f is not divided; where it is, an upper estimate, as for `thread`.
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        self.cloth.albedo(w, curve)
+    }
+
+    #[inline(always)]
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        self.cloth.albedo_bound(w, curve)
+    }
 }
 
 /// What to bake for a cloth that `kernel` integrates: [`integrate`] of the yarns its key stands for.

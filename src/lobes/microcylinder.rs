@@ -8,11 +8,10 @@
 //! The presets are *recalled* from the paper's Table II by way of third-party transcriptions, not read from it, and the
 //! segments of the offset curves are taken as equally long.
 
-use super::cloth::{self, Cloth, EVENLY, FLAT, TANGENTS, Yarn, weights};
+use super::cloth::{self, ClothParams, EVENLY, FLAT, TANGENTS, Woven, Yarn, weights};
 use super::registry::{ClosureParams, closure};
-use super::{Lobe, Rgb};
-use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::albedo::{COMPONENTS, FibreKey, TableSpec};
+use crate::optics::V3;
 
 closure! {
     /// Woven cloth of two families of dielectric threads, one along T, one across it. One-sided: black below the
@@ -70,10 +69,7 @@ static PRESETS: [[Yarn; 2]; 5] = [
 ];
 
 /// See [`MicrocylinderParams`].
-#[derive(Clone, Copy, Debug)]
-pub struct Microcylinder<S> {
-    cloth: Cloth<S>,
-}
+pub type Microcylinder<S> = Woven<S, MicrocylinderParams>;
 
 fn preset(index: usize) -> &'static [Yarn; 2] {
     &PRESETS[index.min(PRESETS.len() - 1)]
@@ -83,9 +79,7 @@ fn kernel(key: &FibreKey, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONEN
     cloth::integrate(preset(key[0] as usize), key[15] as usize, wo, wi, out);
 }
 
-impl<S: Real> Lobe<S> for Microcylinder<S> {
-    type Params = MicrocylinderParams;
-
+impl ClothParams for MicrocylinderParams {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let spec = MicrocylinderParams::SPEC;
         let index = spec.params[2].clamp(0, values[spec.slot_of("preset")?]?) as usize;
@@ -94,30 +88,7 @@ impl<S: Real> Lobe<S> for Microcylinder<S> {
         Some(cloth::table(kernel, key, preset(index)))
     }
 
-    fn new(params: &MicrocylinderParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-        Microcylinder { cloth: Cloth::new(preset(params.preset as usize), wo, curve) }
-    }
-
-    #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.f(wi, curve)
-    }
-
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        self.cloth.pdf(wi)
-    }
-
-    fn sample(&self, u: [S; 2]) -> V3<S> {
-        self.cloth.sample(u)
-    }
-
-    /// Exact where f is not divided, as for most presets; where it is, an upper estimate, as for `thread`.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-        self.cloth.albedo(w, curve)
-    }
-
-    #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.albedo_bound(w, curve)
+    fn yarns(&self) -> [Yarn; 2] {
+        *preset(self.preset as usize)
     }
 }

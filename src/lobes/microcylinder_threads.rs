@@ -24,11 +24,11 @@
 //! where threads are pale or seen along their length: darker, never gaining. Where f is divided, the albedo estimate is
 //! high.
 
-use super::cloth::{self, Cloth, EVENLY, FLAT, Yarn};
+use super::cloth::{self, ClothParams, EVENLY, FLAT, Woven, Yarn};
 use super::registry::{Build, ClosureParams, Form, closure};
-use super::{Lobe, LobeKind, Rgb, Rgb32};
-use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use super::{LobeKind, Rgb32};
+use crate::albedo::{COMPONENTS, FibreKey, TableSpec};
+use crate::optics::V3;
 
 closure! {
     /// Woven cloth of two families of dielectric threads, one along T, one across it, parameter by parameter.
@@ -98,14 +98,9 @@ fn kernel(key: &FibreKey, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONEN
 }
 
 /// See [`MicrocylinderThreadsParams`].
-#[derive(Clone, Copy, Debug)]
-pub struct MicrocylinderThreads<S> {
-    cloth: Cloth<S>,
-}
+pub type MicrocylinderThreads<S> = Woven<S, MicrocylinderThreadsParams>;
 
-impl<S: Real> Lobe<S> for MicrocylinderThreads<S> {
-    type Params = MicrocylinderThreadsParams;
-
+impl ClothParams for MicrocylinderThreadsParams {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let spec = MicrocylinderThreadsParams::SPEC;
         let mut key = [0.0; 16];
@@ -116,32 +111,9 @@ impl<S: Real> Lobe<S> for MicrocylinderThreads<S> {
         Some(cloth::table(kernel, key, &yarns(&key)))
     }
 
-    fn new(p: &MicrocylinderThreadsParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-        let warp = yarn(p.A1, [p.eta1, p.kd1, p.gamma_s1, p.gamma_v1, p.a1, p.offset1]);
-        let weft = yarn(p.A2, [p.eta2, p.kd2, p.gamma_s2, p.gamma_v2, p.a2, p.offset2]);
-        MicrocylinderThreads { cloth: Cloth::new(&[warp, weft], wo, curve) }
-    }
-
-    #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.f(wi, curve)
-    }
-
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        self.cloth.pdf(wi)
-    }
-
-    fn sample(&self, u: [S; 2]) -> V3<S> {
-        self.cloth.sample(u)
-    }
-
-    /// Exact where f is not divided; where it is, an upper estimate, as for `thread`.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-        self.cloth.albedo(w, curve)
-    }
-
-    #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.albedo_bound(w, curve)
+    fn yarns(&self) -> [Yarn; 2] {
+        let warp = yarn(self.A1, [self.eta1, self.kd1, self.gamma_s1, self.gamma_v1, self.a1, self.offset1]);
+        let weft = yarn(self.A2, [self.eta2, self.kd2, self.gamma_s2, self.gamma_v2, self.a2, self.offset2]);
+        [warp, weft]
     }
 }
