@@ -7,6 +7,7 @@
 use crate::span::{Source, Span};
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet, Title};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -53,6 +54,8 @@ pub struct Diagnostic {
     pub labels: Vec<Label>,
     /// What to do instead.
     pub help: Vec<String>,
+    /// The included file it is about; `None`: the script itself.
+    pub origin: Option<Arc<Source>>,
 }
 
 impl Diagnostic {
@@ -69,7 +72,7 @@ impl Diagnostic {
     fn new(severity: Severity, code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
         debug_assert!(CODES.iter().any(|(c, _)| *c == code), "{code} is not in the table of codes");
         let (note, labels, help) = (String::new(), Vec::new(), Vec::new());
-        Diagnostic { severity, code, message: message.into(), span, note, labels, help }
+        Diagnostic { severity, code, message: message.into(), span, note, labels, help, origin: None }
     }
 
     /// With words beside the caret.
@@ -93,6 +96,24 @@ impl Diagnostic {
         self
     }
 
+    /// For a script with included files: what it is about goes with it, and places in other files are told in words.
+    #[must_use]
+    pub fn among(mut self, sources: &[Arc<Source>]) -> Diagnostic {
+        let file = self.span.file;
+        let source = |file: u32| sources.get((file as usize).wrapping_sub(1));
+        self.origin = source(file).cloned();
+        let (same, others): (Vec<_>, Vec<_>) = self.labels.into_iter().partition(|label| label.span.file == file);
+        self.labels = same;
+        for label in others {
+            let at = source(label.span.file).map_or("the script".to_owned(), |source| {
+                let at = source.line_column(label.span.start as usize);
+                format!("{}:{}:{}", source.name, at.line, at.column)
+            });
+            self.help.push(format!("{}: {at}", label.text));
+        }
+        self
+    }
+
     /// Whether this is an error.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
@@ -100,6 +121,7 @@ impl Diagnostic {
 
     /// `file:line:column: error[E0201]: message`
     pub fn line(&self, source: &Source) -> String {
+        let source = self.origin.as_deref().unwrap_or(source);
         let at = source.line_column(self.span.start as usize);
         let (severity, code) = (self.severity.name(), self.code);
         format!("{}:{}:{}: {severity}[{code}]: {}", source.name, at.line, at.column, clip(&self.message))
@@ -107,6 +129,7 @@ impl Diagnostic {
 
     /// The message with the lines of source it is about. `color`: with terminal escapes.
     pub fn render(&self, source: &Source, color: bool) -> String {
+        let source = self.origin.as_deref().unwrap_or(source);
         let level = match self.severity {
             Severity::Error => Level::ERROR,
             Severity::Warning => Level::WARNING,
@@ -276,6 +299,8 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0108", "a number does not fit its type"),
     ("E0109", "a part of the language that is not supported"),
     ("E0110", "the script is too large"),
+    ("E0111", "a macro cannot be replaced"),
+    ("E0112", "`#include` goes too deep"),
     ("E0201", "an unknown name"),
     ("E0202", "a name is declared twice"),
     ("E0203", "a value has the wrong type"),
@@ -285,6 +310,9 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0207", "something that cannot be assigned to"),
     ("E0208", "a component that the value does not have"),
     ("E0209", "a condition that is no number"),
+    ("E0210", "a function calls itself"),
+    ("E0211", "`break` or `continue` outside a loop"),
+    ("E0212", "the script is too large with its calls written out"),
     ("E0301", "closures are added and scaled, nothing else"),
     ("E0302", "an unknown keyword argument of a closure"),
     ("E0303", "an unknown option"),
@@ -296,6 +324,8 @@ pub const CODES: &[(&str, &str)] = &[
     ("W0502", "a statement without effect"),
     ("W0503", "a parameter lies outside its declared range"),
     ("W0504", "the top of a layer transmits"),
+    ("W0505", "the preprocessor has something to say"),
+    ("W0506", "a function is not quite what its name says"),
     ("W0702", "whether the material gains energy could not be decided"),
     ("W0703", "a weight can be negative"),
 ];

@@ -9,12 +9,13 @@ use crate::albedo::Precision;
 use crate::closure::balance::Construction;
 use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
 use crate::diag::{Diagnostic, render_all};
-use crate::ir::{self, CheckedShader, GlobalVar, ParamDecl, Program, Value};
+use crate::ir::{self, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
 use crate::lobes;
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
 use crate::lobes::registry::Form;
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
+use crate::syntax::{Includes, Limits, Options};
 use glam::Vec3;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
@@ -57,6 +58,8 @@ pub struct Engine {
     layering: Layering,
     /// Closures of the host, as scripts call them.
     hosts: Arc<[Form]>,
+    options: Options,
+    host: Option<Arc<dyn Host>>,
 }
 
 impl Engine {
@@ -115,6 +118,43 @@ impl Engine {
         Ok(Engine { hosts, ..self })
     }
 
+    /// Sets the budgets of scripts.
+    pub fn limits(mut self, limits: Limits) -> Self {
+        self.options.limits = limits;
+        self
+    }
+
+    /// Chooses where `#include` finds files that are not built in: for example [`Directories`](crate::syntax::Directories).
+    pub fn includes(mut self, includes: impl Includes + 'static) -> Self {
+        self.options.includes = Some(Arc::new(includes));
+        self
+    }
+
+    /// Defines a macro before the first line of every script.
+    pub fn define(mut self, name: impl Into<String>, text: impl Into<String>) -> Self {
+        self.options.defines.push((name.into(), text.into()));
+        self
+    }
+
+    /// Lets scripts ask the host: for textures, attributes, spaces, kinds of rays, and to print.
+    ///
+    /// ```
+    /// use overcoat::{Engine, Globals, ir::{Host, Lookup}};
+    /// struct Gray;
+    /// impl Host for Gray {
+    ///     fn texture(&self, lookup: &Lookup, _: &Globals) -> Option<[f32; 4]> {
+    ///         Some([lookup.s, lookup.t, 0.5, 1.0])
+    ///     }
+    /// }
+    /// let shader = Engine::new().host(Gray).compile("a", "Ci = (color)texture(\"a.png\", 0.25, v) * diffuse(N);")?;
+    /// let tree = shader.material(&[])?.tree(&Globals::default())?;
+    /// assert_eq!(tree.size(tree.root()).lobes, 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn host(self, host: impl Host + 'static) -> Self {
+        Engine { host: Some(Arc::new(host)), ..self }
+    }
+
     pub(crate) fn layering_of(&self) -> Layering {
         self.layering
     }
@@ -125,7 +165,7 @@ impl Engine {
     /// Everything that is wrong with the script, with its places.
     pub fn compile(&self, name: &str, text: &str) -> Result<Shader, ScriptError> {
         let source = Arc::new(Source::new(name, text));
-        match ir::compile_with(name, text, &self.hosts) {
+        match ir::compile_with(name, text, &self.hosts, &self.options, self.host.clone()) {
             Ok((checked, warnings)) => {
                 Ok(Shader { engine: self.clone(), source, checked: Arc::new(checked), warnings })
             }
@@ -290,7 +330,8 @@ impl Material {
     /// # Errors
     /// If the tree goes beyond a budget.
     pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
-        flatten(tree, globals, V3::from_f32(wo.to_array()), self.inner.engine.layering, &self.inner.tables.curves)
+        let wo = V3::from_f32(wo.to_array());
+        Ok(flatten(tree, globals, wo, self.inner.engine.layering, &self.inner.tables.curves)?)
     }
 
     /// [`flatten`](Self::flatten) in double precision.
@@ -304,7 +345,7 @@ impl Material {
         wo: [f64; 3],
     ) -> Result<Bsdf<'_, f64>, ShadeError> {
         let wo = V3::new(wo[0], wo[1], wo[2]);
-        flatten(tree, globals, wo, self.inner.engine.layering, &self.reference_tables().curves)
+        Ok(flatten(tree, globals, wo, self.inner.engine.layering, &self.reference_tables().curves)?)
     }
 
     fn flattened<'m, S: Scalar>(
@@ -317,7 +358,7 @@ impl Material {
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
         let tree = self.tree(&globals)?;
         let tables = Tables { curves: &tables.curves, balance: tables.balance.as_ref() };
-        flatten(&tree, &globals, wo, self.inner.engine.layering, tables)
+        Ok(flatten(&tree, &globals, wo, self.inner.engine.layering, tables)?)
     }
 
     fn reference_tables(&self) -> &Baked<f64> {

@@ -5,7 +5,7 @@
 //! here knows what the text means.
 
 /// A range of bytes of a source file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Span {
     /// Index of the file among those of one compilation; 0 is the script itself.
     pub file: u32,
@@ -24,6 +24,9 @@ impl Span {
 
     /// From the start of `self` to the end of `other`.
     pub fn to(self, other: Span) -> Span {
+        if other.file != self.file {
+            return self;
+        }
         Span { file: self.file, start: self.start.min(other.start), end: self.end.max(other.end) }
     }
 

@@ -262,18 +262,18 @@ warning[W0501]: `Ci` is never assigned: the material is black
   |
   = help: assign a closure, for example `Ci = diffuse(N);`
 "##);
-    insta::assert_snapshot!(messages("float x = 1\nCi = x * diffuse(N);\nfor (x = 0; x < 2; x += 1) { }"), @r##"
+    insta::assert_snapshot!(messages("float x = 1\nCi = x * diffuse(N);\nfor (x = 0; x < 2) { }"), @r##"
 error[E0107]: a `;` is missing after this
  --> velvet.osl:1:11
   |
 1 | float x = 1
   |           ^ expected `;` here
 
-error[E0109]: loops are not supported
- --> velvet.osl:3:1
+error[E0107]: `)` was not expected here
+ --> velvet.osl:3:18
   |
-3 | for (x = 0; x < 2; x += 1) { }
-  | ^^^
+3 | for (x = 0; x < 2) { }
+  |                  ^ expected `;`, `,` or an operator
 "##);
     insta::assert_snapshot!(messages("Ci = layer(diffuse(N), 0.5);"), @r##"
 error[E0205]: `base` of `layer` is closure color, not float
@@ -308,7 +308,8 @@ error[E0103]: unknown header `my.h`
 1 | #include "my.h"
   | ^^^^^^^^^^^^^^^
   |
-  = help: these are built in: stdosl.h, oslutil.h, stdcycles.h, mx_funcs.h, overcoat.h
+  = help: these are built in: stdosl.h, oslutil.h, stdcycles.h, mx_funcs.h, overcoat.h, vector2.h, vector4.h, color2.h, color4.h, matrix33.h
+  = help: others are looked for in the include directories: `-I DIR`
 "##);
     insta::assert_snapshot!(messages("surface s() { diffuse(N); }"), @r##"
 warning[W0502]: this statement has no effect

@@ -15,7 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("closure", &["lobes", "albedo", "optics", "globals"]),
     ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
     ("audit", &["engine", "ir", "closure", "lobes", "albedo", "optics", "globals"]),
-    ("engine", &["ir", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
+    ("engine", &["ir", "syntax", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
     ("prove", &["ir", "closure", "lobes", "audit", "optics", "engine", "diag", "span", "globals"]),
     ("preview", &["engine", "closure", "lobes", "globals"]),
     (

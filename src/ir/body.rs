@@ -5,6 +5,7 @@
 //! are up to three 32-bit cells (floats and ints by their bits, strings by their number). Statements nest as far as the
 //! script's braces do. Nothing here is wrong any more: [`super::check`] has seen to that.
 
+use super::tasks::Task;
 use super::types::Ty;
 use crate::globals::Globals;
 use crate::lobes::LobeKind;
@@ -187,6 +188,8 @@ pub enum ExprKind {
     Black,
     /// The value of a variable.
     Var(VarId),
+    /// One of so many variables that follow each other, by an index that is limited to what there is.
+    Element(VarId, u32, ExprId),
     /// A fact about the shading point.
     Global(GlobalVar),
     /// An operation; operands beyond its arity are unused.
@@ -215,6 +218,30 @@ pub struct Expr {
 pub enum Stmt {
     /// `var = value`
     Assign(VarId, Root),
+    /// `value` into one of `len` variables that follow each other from `base` on; the index is limited to what there is.
+    Store {
+        /// The first.
+        base: VarId,
+        /// How many.
+        len: u32,
+        /// An int.
+        index: VarId,
+        /// Of the type of the variables.
+        value: VarId,
+    },
+    /// Something with any number of results.
+    Do(Box<Deed>),
+    /// `before`, then, if the condition holds, `body` and once more from the start.
+    Loop {
+        /// Done before each test.
+        before: Vec<Stmt>,
+        /// An int.
+        condition: Root,
+        /// Done after it if it is not zero.
+        body: Vec<Stmt>,
+        /// Where the loop begins.
+        span: Span,
+    },
     /// Two ways to go on.
     If {
         /// An int.
@@ -224,6 +251,38 @@ pub enum Stmt {
         /// If it is.
         other: Vec<Stmt>,
     },
+}
+
+/// What a statement does that has any number of results.
+#[derive(Clone, Debug)]
+pub struct Deed {
+    /// What is done.
+    pub task: Task,
+    /// What it is done with.
+    pub args: Vec<VarId>,
+    /// What it writes.
+    pub outs: Vec<VarId>,
+    /// Where the call stands.
+    pub span: Span,
+}
+
+/// Calls `see` for each variable that statements may write.
+pub fn each_written(stmts: &[Stmt], see: &mut impl FnMut(VarId)) {
+    for stmt in stmts {
+        match stmt {
+            Stmt::Assign(var, _) => see(*var),
+            Stmt::Store { base, len, .. } => (0..*len).for_each(|i| see(VarId(base.0 + i))),
+            Stmt::Do(deed) => deed.outs.iter().for_each(|out| see(*out)),
+            Stmt::Loop { before, body, .. } => {
+                each_written(before, see);
+                each_written(body, see);
+            }
+            Stmt::If { then, other, .. } => {
+                each_written(then, see);
+                each_written(other, see);
+            }
+        }
+    }
 }
 
 /// A program.
@@ -271,7 +330,7 @@ impl Body {
             ExprKind::Const(_) | ExprKind::Black | ExprKind::Var(_) | ExprKind::Global(_) => {}
             ExprKind::Op(op, ids) => ids[..op.arity()].iter().copied().for_each(see),
             ExprKind::Call(_, args) | ExprKind::Lobe(_, args) => self.args(args).iter().copied().for_each(see),
-            ExprKind::OptionIndex(_, id) => see(id),
+            ExprKind::OptionIndex(_, id) | ExprKind::Element(_, _, id) => see(id),
         }
     }
 }

@@ -7,7 +7,7 @@
 use super::body::{Body, ExprId, ExprKind, Op, Root, Stmt, VarId};
 use super::passes::layers::Layers;
 use super::passes::needs::Needs;
-use super::program::{Instr, Program, Site};
+use super::program::{Call, Instr, Program, Site};
 use super::types::Ty;
 use crate::diag::Diagnostic;
 use std::collections::HashMap;
@@ -27,11 +27,15 @@ pub fn lower(body: &Body, needs: &Needs, layers: &Layers, warnings: Vec<Diagnost
         closures: lower.max_closures as usize,
         ci: lower.closure_vars[VarId::CI.index()],
         sites: lower.sites,
+        deeds: lower.deeds,
         layer_pairs,
         strings,
         globals: needs.globals.iter().copied().collect(),
         constant: !needs.varying,
         warnings,
+        host: None,
+        iterations: u32::MAX,
+        removed: Vec::new(),
     }
 }
 
@@ -75,6 +79,7 @@ struct Lower<'a> {
     max_closures: u32,
     values: Vec<Reg>,
     sites: Vec<Site>,
+    deeds: Vec<Call>,
     /// The site of each lobe expression.
     site_of: HashMap<u32, u32>,
 }
@@ -95,10 +100,18 @@ impl<'a> Lower<'a> {
             max_closures: 1,
             values: Vec::new(),
             sites: Vec::new(),
+            deeds: Vec::new(),
             site_of: HashMap::new(),
         };
         lower.closure_vars[VarId::CI.index()] = lower.closure();
         let mut placed = vec![false; body.vars.len()];
+        // Variables that are indexed follow each other.
+        lower.place_ranges(&body.stmts, &mut placed);
+        for (expr, _) in body.exprs.iter().zip(&needs.used).filter(|(_, used)| **used) {
+            if let ExprKind::Element(base, len, _) = expr.kind {
+                lower.place_range(base, len, &mut placed);
+            }
+        }
         lower.place_targets(&body.stmts, &mut placed);
         for (i, used) in needs.used.iter().enumerate() {
             if *used {
@@ -114,12 +127,38 @@ impl<'a> Lower<'a> {
         for stmt in stmts {
             match stmt {
                 Stmt::Assign(var, _) => self.place_var(*var, placed),
+                Stmt::Store { index, value, .. } => {
+                    self.place_var(*index, placed);
+                    self.place_var(*value, placed);
+                }
+                Stmt::Do(deed) => deed.args.iter().chain(&deed.outs).for_each(|var| self.place_var(*var, placed)),
+                Stmt::Loop { before, body, .. } => {
+                    self.place_targets(before, placed);
+                    self.place_targets(body, placed);
+                }
                 Stmt::If { then, other, .. } => {
                     self.place_targets(then, placed);
                     self.place_targets(other, placed);
                 }
             }
         }
+    }
+
+    fn place_ranges(&mut self, stmts: &[Stmt], placed: &mut [bool]) {
+        for stmt in stmts {
+            match stmt {
+                Stmt::Store { base, len, .. } => self.place_range(*base, *len, placed),
+                Stmt::Loop { before: a, body: b, .. } | Stmt::If { then: a, other: b, .. } => {
+                    self.place_ranges(a, placed);
+                    self.place_ranges(b, placed);
+                }
+                Stmt::Assign(..) | Stmt::Do(_) => {}
+            }
+        }
+    }
+
+    fn place_range(&mut self, base: VarId, len: u32, placed: &mut [bool]) {
+        (0..len).for_each(|i| self.place_var(VarId(base.0 + i), placed));
     }
 
     fn place_var(&mut self, var: VarId, placed: &mut [bool]) {
@@ -171,6 +210,35 @@ impl<'a> Lower<'a> {
                     let target = vars[var.index()];
                     let value = self.run(*root, Some(target));
                     self.copy(ty, target, value);
+                }
+                Stmt::Store { base, len, index, value } => {
+                    let (len, index) = (*len, self.cell_vars[index.index()]);
+                    self.code.push(match self.body.vars[base.index()] {
+                        Ty::Closure => {
+                            let (base, src) = (self.closure_vars[base.index()], self.closure_vars[value.index()]);
+                            Instr::StoreC { base, len, index, src }
+                        }
+                        ty => {
+                            let (base, src) = (self.cell_vars[base.index()], self.cell_vars[value.index()]);
+                            Instr::Store { width: ty.cells() as u8, base, len, index, src }
+                        }
+                    });
+                }
+                Stmt::Do(deed) => {
+                    let reg = |var: &VarId| (self.body.vars[var.index()], self.cell_vars[var.index()]);
+                    let (args, outs) = (deed.args.iter().map(reg).collect(), deed.outs.iter().map(reg).collect());
+                    self.code.push(Instr::Do { deed: self.deeds.len() as u32 });
+                    self.deeds.push(Call { task: deed.task, args, outs });
+                }
+                Stmt::Loop { before, condition, body, .. } => {
+                    let head = self.code.len() as u32;
+                    self.code.push(Instr::Round);
+                    self.block(before);
+                    let condition = self.run(*condition, None);
+                    let to_end = self.jump(Instr::JumpIfZero { condition, to: 0 });
+                    self.block(body);
+                    self.code.push(Instr::Jump { to: head });
+                    self.land(to_end);
                 }
                 Stmt::If { condition, then, other } => {
                     let condition = self.run(*condition, None);
@@ -298,6 +366,13 @@ impl<'a> Lower<'a> {
                     self.args.extend([*reg, self.body.expr(*id).ty.cells() as u32]);
                 }
                 Instr::Call { function, width: expr.ty.cells() as u8, count: ids.len() as u8, dst, args: start }
+            }
+            ExprKind::Element(base, len, _) if expr.ty == Ty::Closure => {
+                Instr::ElementC { dst, base: self.closure_vars[base.index()], len, index: at(0) }
+            }
+            ExprKind::Element(base, len, _) => {
+                let base = self.cell_vars[base.index()];
+                Instr::Element { width: expr.ty.cells() as u8, dst, base, len, index: at(0) }
             }
             ExprKind::OptionIndex(options, _) => Instr::OptionIndex { options, dst, name: at(0) },
             ExprKind::Lobe(kind, args) => {

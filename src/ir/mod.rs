@@ -9,20 +9,26 @@ pub(crate) mod body;
 pub(crate) mod builtins;
 mod check;
 mod functions;
+mod host;
 mod lower;
 pub(crate) mod ops;
 mod passes;
 mod program;
 mod shader;
+pub(crate) mod tasks;
 mod types;
 
 pub use body::GlobalVar;
+pub use host::{Host, Lookup, Speech};
 pub use program::{Program, ShadeError, Site};
 pub use shader::{CheckedShader, ParamDecl, Value};
 pub use types::Ty;
 
 use crate::diag::Diagnostic;
 use crate::lobes::registry::Form;
+use crate::span::Source;
+use crate::syntax::Options;
+use std::sync::Arc;
 
 /// Compiles a script. `name` names it in messages, and the shader where the script does not.
 ///
@@ -31,10 +37,10 @@ use crate::lobes::registry::Form;
 /// # Errors
 /// All errors found, with warnings after them.
 pub fn compile(name: &str, source: &str) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
-    compile_with(name, source, &[])
+    compile_with(name, source, &[], &Options::default(), None)
 }
 
-/// The same for a host that brings along closures of its own.
+/// The same for a host that brings along closures of its own, include directories, budgets, and answers to questions.
 ///
 /// # Errors
 /// All errors found, with warnings after them.
@@ -42,7 +48,21 @@ pub fn compile_with(
     name: &str,
     source: &str,
     hosts: &[Form],
+    options: &Options,
+    host: Option<Arc<dyn Host>>,
 ) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let ast = crate::syntax::parse(source)?;
-    check::check(name, &ast, hosts)
+    let ast = crate::syntax::parse_with(name, source, options).map_err(|(d, sources)| placed(d, &sources))?;
+    match check::check(name, &ast, hosts, &options.limits) {
+        Ok((checked, warnings)) => Ok((CheckedShader { host, ..checked }, placed(warnings, &ast.sources))),
+        Err(errors) => Err(placed(errors, &ast.sources)),
+    }
+}
+
+/// Messages about included files carry these along.
+fn placed(diagnostics: Vec<Diagnostic>, sources: &[Source]) -> Vec<Diagnostic> {
+    if sources.is_empty() {
+        return diagnostics;
+    }
+    let sources: Vec<Arc<Source>> = sources.iter().map(|s| Arc::new(s.clone())).collect();
+    diagnostics.into_iter().map(|d| d.among(&sources)).collect()
 }

@@ -6,16 +6,49 @@
 
 use super::body::{Cells, GlobalVar, Op};
 use super::builtins::{BUILTINS, MAX_ARGS};
+use super::host::Host;
 use super::ops;
+use super::tasks::{Strings, Surroundings, Task};
+use super::types::Ty;
 use crate::Globals;
 use crate::closure::{ClosureTree, NodeId, TreeError};
 use crate::diag::Diagnostic;
 use crate::lobes::LobeKind;
 use crate::span::Span;
 use smallvec::SmallVec;
+use std::fmt;
+use std::sync::Arc;
 
 /// Shading went beyond a budget.
-pub type ShadeError = TreeError;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShadeError {
+    /// The closure tree is too large.
+    Tree(TreeError),
+    /// Loops took more rounds than this.
+    Iterations(u32),
+}
+
+impl From<TreeError> for ShadeError {
+    fn from(e: TreeError) -> ShadeError {
+        ShadeError::Tree(e)
+    }
+}
+
+impl fmt::Display for ShadeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ShadeError::Tree(e) => e.fmt(f),
+            ShadeError::Iterations(most) => {
+                write!(
+                    f,
+                    "loops take more than {most} rounds at one point; `Limits::iterations` sets how many they may"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for ShadeError {}
 
 /// One place in a program that makes a lobe.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +87,39 @@ pub(super) enum Instr {
         dst: u32,
         name: u32,
     },
+    /// One of `len` values of `width` cells.
+    Element {
+        width: u8,
+        dst: u32,
+        base: u32,
+        len: u32,
+        index: u32,
+    },
+    ElementC {
+        dst: u32,
+        base: u32,
+        len: u32,
+        index: u32,
+    },
+    Store {
+        width: u8,
+        base: u32,
+        len: u32,
+        index: u32,
+        src: u32,
+    },
+    StoreC {
+        base: u32,
+        len: u32,
+        index: u32,
+        src: u32,
+    },
+    /// One of [`Program::deeds`].
+    Do {
+        deed: u32,
+    },
+    /// A loop starts a round.
+    Round,
     Copy {
         n: u8,
         dst: u32,
@@ -98,6 +164,14 @@ pub(super) enum Instr {
     },
 }
 
+/// A task with its registers.
+#[derive(Clone, Debug)]
+pub(super) struct Call {
+    pub task: Task,
+    pub args: Vec<(Ty, u32)>,
+    pub outs: Vec<(Ty, u32)>,
+}
+
 /// A shader with its parameters fixed, ready to shade.
 #[derive(Clone, Debug)]
 pub struct Program {
@@ -108,10 +182,14 @@ pub struct Program {
     pub(super) closures: usize,
     pub(super) ci: u32,
     pub(super) sites: Vec<Site>,
+    pub(super) deeds: Vec<Call>,
     pub(super) layer_pairs: Vec<(u32, u32)>,
     pub(super) strings: Vec<String>,
     pub(super) globals: Vec<GlobalVar>,
     pub(super) constant: bool,
+    pub(super) host: Option<Arc<dyn Host>>,
+    pub(super) iterations: u32,
+    pub(super) removed: Vec<String>,
     /// Values set outside their declared range.
     pub warnings: Vec<Diagnostic>,
 }
@@ -139,6 +217,11 @@ impl Program {
         &self.layer_pairs
     }
 
+    /// What specialising removed, and why: one sentence each.
+    pub fn removed(&self) -> &[String] {
+        &self.removed
+    }
+
     /// Number of instructions.
     pub fn len(&self) -> usize {
         self.code.len()
@@ -152,10 +235,12 @@ impl Program {
     /// Makes `tree` the closure at a shading point.
     ///
     /// # Errors
-    /// The tree is larger than a budget allows; it is then black.
+    /// The tree is larger, or loops run longer, than a budget allows; it is then black.
     pub fn shade(&self, globals: &Globals, tree: &mut ClosureTree) -> Result<(), ShadeError> {
         tree.clear();
-        let mut cells: SmallVec<[u32; 160]> = SmallVec::from_slice(&self.image);
+        let mut cells: SmallVec<[u32; 512]> = SmallVec::from_slice(&self.image);
+        let mut rounds = self.iterations;
+        let mut strings = Strings::new(&self.strings);
         cells.resize(self.registers, 0);
         let mut closures: SmallVec<[NodeId; 32]> = SmallVec::from_elem(tree.zero(), self.closures);
         let mut at = 0;
@@ -172,11 +257,39 @@ impl Program {
                     write(&mut cells, dst, width as usize, value);
                 }
                 Instr::OptionIndex { options, dst, name } => {
-                    let name = self.strings.get(cells[name as usize] as usize).map_or("", String::as_str);
+                    let name = strings.get(cells[name as usize]);
                     // A name that is only known now and unknown to the lobe means its first option.
                     let index = options.iter().position(|option| *option == name).unwrap_or(0);
                     cells[dst as usize] = (index as f32).to_bits();
                 }
+                Instr::Element { width, dst, base, len, index } => {
+                    let at = limited(cells[index as usize], len);
+                    let value = read(&cells, base + at * u32::from(width), width as usize);
+                    write(&mut cells, dst, width as usize, value);
+                }
+                Instr::ElementC { dst, base, len, index } => {
+                    closures[dst as usize] = closures[(base + limited(cells[index as usize], len)) as usize];
+                }
+                Instr::Store { width, base, len, index, src } => {
+                    let at = limited(cells[index as usize], len);
+                    let value = read(&cells, src, width as usize);
+                    write(&mut cells, base + at * u32::from(width), width as usize, value);
+                }
+                Instr::StoreC { base, len, index, src } => {
+                    closures[(base + limited(cells[index as usize], len)) as usize] = closures[src as usize];
+                }
+                Instr::Do { deed } => {
+                    let host = self.host.as_deref();
+                    let mut around = Surroundings { strings: &mut strings, host, globals };
+                    self.deeds[deed as usize].run(&mut cells, &mut around);
+                }
+                Instr::Round => match rounds.checked_sub(1) {
+                    Some(left) => rounds = left,
+                    None => {
+                        tree.set_root(tree.zero());
+                        return Err(ShadeError::Iterations(self.iterations));
+                    }
+                },
                 Instr::Copy { n, dst, src } => {
                     let value = read(&cells, src, n as usize);
                     write(&mut cells, dst, n as usize, value);
@@ -212,7 +325,8 @@ impl Program {
             }
         }
         tree.set_root(closures[self.ci as usize]);
-        tree.within_budget().inspect_err(|_| tree.set_root(tree.zero()))
+        tree.within_budget().inspect_err(|_| tree.set_root(tree.zero()))?;
+        Ok(())
     }
 
     fn call(&self, cells: &[u32], function: u16, width: u8, count: u8, args: u32) -> Cells {
@@ -223,6 +337,23 @@ impl Program {
         }
         BUILTINS[function as usize].apply(width as usize, &values[..count as usize])
     }
+}
+
+impl Call {
+    fn run(&self, cells: &mut [u32], around: &mut Surroundings) {
+        let get = |(ty, reg): &(Ty, u32)| (*ty, read(cells, *reg, ty.cells()));
+        let args: SmallVec<[(Ty, Cells); 32]> = self.args.iter().map(get).collect();
+        let mut outs: SmallVec<[(Ty, Cells); 17]> = self.outs.iter().map(get).collect();
+        self.task.run(&args, around, &mut outs);
+        for ((ty, reg), (_, value)) in self.outs.iter().zip(outs) {
+            write(cells, *reg, ty.cells(), value);
+        }
+    }
+}
+
+/// An index limited to what there is.
+fn limited(index: u32, len: u32) -> u32 {
+    (index as i32).clamp(0, len as i32 - 1) as u32
 }
 
 /// Up to `n` cells; what lies beyond the registers reads as zero.

@@ -2,12 +2,15 @@
 
 use super::body::{Body, Cells, ExprKind, VarId};
 use super::check::suggest;
+use super::host::Host;
 use super::lower;
 use super::passes::{dead, fold, layers, needs};
 use super::program::Program;
 use super::types::Ty;
 use crate::diag::Diagnostic;
-use crate::span::Span;
+use crate::span::{Source, Span};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A value that a parameter is set to.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +64,9 @@ impl Value {
             Ty::Normal => Value::Normal(triple),
             Ty::Point => Value::Point(triple),
             Ty::String => Value::String(strings.get(cells[0] as usize).cloned().unwrap_or_default()),
+            // Parameters and metadata are of simple types.
             Ty::Color | Ty::Closure | Ty::Poison => Value::Color(triple),
+            Ty::Matrix | Ty::Struct(_) | Ty::Array(_) | Ty::Void => Value::Color(triple),
         }
     }
 
@@ -124,6 +129,9 @@ pub struct CheckedShader {
     pub(super) params: Vec<ParamDecl>,
     pub(super) metadata: Vec<(String, Value)>,
     pub(crate) body: Body,
+    pub(super) sources: Vec<Arc<Source>>,
+    pub(crate) host: Option<Arc<dyn Host>>,
+    pub(super) iterations: u32,
 }
 
 impl CheckedShader {
@@ -169,8 +177,9 @@ impl CheckedShader {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let body = dead::remove(fold::fold(&body, &known));
-        let needs = needs::needs(&body);
+        let hosted = self.host.is_some();
+        let body = dead::remove(fold::fold(&body, &known, hosted));
+        let needs = needs::needs(&body, hosted);
         if !needs.errors.is_empty() {
             return Err(needs.errors);
         }
@@ -185,15 +194,54 @@ impl CheckedShader {
                 warnings.push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
             }
         }
-        Ok(lower::lower(&body, &needs, &layers, warnings))
+        let removed = self.removed(&body, &needs, set);
+        let program = lower::lower(&body, &needs, &layers, warnings);
+        Ok(Program { host: self.host.clone(), iterations: self.iterations, removed, ..program })
     }
 
     /// The program with every parameter left open: read from memory at every point instead of folded away. What
     /// specialising saves is the difference to it.
     pub fn unspecialised(&self) -> Program {
         let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
-        let body = dead::remove(fold::fold_open(&self.body, &open));
-        lower::lower(&body, &needs::needs(&body), &layers::layers(&body), Vec::new())
+        let hosted = self.host.is_some();
+        let body = dead::remove(fold::fold_open(&self.body, &open, hosted));
+        let program = lower::lower(&body, &needs::needs(&body, hosted), &layers::layers(&body), Vec::new());
+        Program { host: self.host.clone(), iterations: self.iterations, ..program }
+    }
+
+    /// Included files; the first is file 1 of spans.
+    pub fn sources(&self) -> &[Arc<Source>] {
+        &self.sources
+    }
+
+    /// What is gone from a specialised body: lobes that were written but are not made, and parameters nothing reads.
+    fn removed(&self, body: &Body, needs: &needs::Needs, set: &[(String, Value)]) -> Vec<String> {
+        let lobes = |body: &Body, live: &dyn Fn(usize) -> bool| {
+            let mut found: BTreeSet<(Span, &'static str)> = BTreeSet::new();
+            for (_, expr) in body.exprs.iter().enumerate().filter(|(i, _)| live(*i)) {
+                if let ExprKind::Lobe(kind, _) = expr.kind {
+                    found.insert((expr.span, kind.spec().name));
+                }
+            }
+            found
+        };
+        let (written, made) = (lobes(&self.body, &|_| true), lobes(body, &|i| needs.used[i]));
+        let gone = written.difference(&made);
+        let mut found: Vec<String> = gone
+            .map(|(_, name)| format!("`{name}` is never made: its weight is zero or its branch is not taken"))
+            .collect();
+        found.dedup();
+        for param in &self.params {
+            if param.ty != Ty::Closure && !param.output {
+                let how = if set.iter().any(|(name, _)| *name == param.name) { "as set" } else { "at its default" };
+                found.push(format!("the parameter `{}` is a constant, {how}", param.name));
+            }
+        }
+        if self.body.exprs.len() > needs.used.iter().filter(|u| **u).count() {
+            let live = needs.used.iter().filter(|used| **used).count();
+            found.push(format!("{live} expressions are left of {}", self.body.exprs.len()));
+        }
+        found
     }
 
     pub(crate) fn unknown_parameter(&self, name: &str) -> Diagnostic {

@@ -20,6 +20,14 @@ pub enum Ty {
     Point,
     /// Text.
     String,
+    /// Sixteen floats in four rows; held as so many variables.
+    Matrix,
+    /// A struct, by its number; held as its fields.
+    Struct(u16),
+    /// An array, by its number; held as its elements.
+    Array(u16),
+    /// What a function returns that returns nothing.
+    Void,
     /// What a surface does to light.
     Closure,
     /// Follows an error; fits everywhere, so that one mistake is reported once.
@@ -38,6 +46,10 @@ impl Ty {
             Ty::Point => "point",
             Ty::String => "string",
             Ty::Closure => "closure color",
+            Ty::Matrix => "matrix",
+            Ty::Struct(_) => "struct",
+            Ty::Array(_) => "array",
+            Ty::Void => "void",
             Ty::Poison => "unknown",
         }
     }
@@ -47,7 +59,7 @@ impl Ty {
         match self {
             Ty::Int | Ty::Float | Ty::String => 1,
             Ty::Color | Ty::Vector | Ty::Normal | Ty::Point => 3,
-            Ty::Closure | Ty::Poison => 0,
+            Ty::Closure | Ty::Poison | Ty::Matrix | Ty::Struct(_) | Ty::Array(_) | Ty::Void => 0,
         }
     }
 
@@ -59,6 +71,11 @@ impl Ty {
     /// Points, vectors and normals, which stand for one another.
     pub const fn is_spatial(self) -> bool {
         matches!(self, Ty::Vector | Ty::Normal | Ty::Point)
+    }
+
+    /// Whether it is held as several variables.
+    pub const fn is_aggregate(self) -> bool {
+        matches!(self, Ty::Matrix | Ty::Struct(_) | Ty::Array(_))
     }
 
     /// Ints and floats.
@@ -86,9 +103,10 @@ impl Ty {
     }
 }
 
-impl From<TypeName> for Ty {
-    fn from(name: TypeName) -> Ty {
-        match name {
+impl Ty {
+    /// The type of a name other than a struct's.
+    pub const fn simple(name: TypeName) -> Option<Ty> {
+        Some(match name {
             TypeName::Float => Ty::Float,
             TypeName::Int => Ty::Int,
             TypeName::Color => Ty::Color,
@@ -97,7 +115,10 @@ impl From<TypeName> for Ty {
             TypeName::Point => Ty::Point,
             TypeName::String => Ty::String,
             TypeName::Closure => Ty::Closure,
-        }
+            TypeName::Matrix => Ty::Matrix,
+            TypeName::Void => Ty::Void,
+            TypeName::Named(_) => return None,
+        })
     }
 }
 

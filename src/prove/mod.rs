@@ -69,7 +69,8 @@ pub fn prove(shader: &Shader, options: &Options) -> Result<Report, Vec<Diagnosti
     body.strings = domain.strings.clone();
     let effort = FINE_EFFORT / domain.cases.len().clamp(1, 30);
     for case in &domain.cases {
-        let Some((graph, root)) = trace::trace(&body, case.bindings.clone(), &domain.globals) else {
+        let Some((graph, root)) = trace::trace(&body, checked.host.is_some(), case.bindings.clone(), &domain.globals)
+        else {
             report.too_large(shader);
             break;
         };

@@ -28,7 +28,9 @@ pub fn probe(shader: &Shader, options: &Options, report: &Report, count: usize, 
     }
     for round in 0..count.div_ceil(DIRECTIONS) {
         let case = &domain.cases[rng.random_range(0..domain.cases.len())];
-        let Some((graph, root)) = trace(&body, case.bindings.clone(), &domain.globals) else { return found };
+        let Some((graph, root)) = trace(&body, checked.host.is_some(), case.bindings.clone(), &domain.globals) else {
+            return found;
+        };
         let problem = Problem::new(&graph, root, Energy::new(&graph, root, shader.engine().layering_of()));
         let hunt = Hunt::new(&problem, shader, case);
         let mut point = hunt.random(&mut rng, round);

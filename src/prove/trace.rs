@@ -3,11 +3,14 @@
 //!
 //! A new kind of statement needs an arm in [`Tracer::block`]; a new kind of expression one in [`Tracer::expr`].
 
+mod statements;
+
 use super::graph::{Cid, Closure, Graph, Id, LeafKind, Node, Order};
 use super::interval::Interval;
 use crate::ir::Ty;
 use crate::ir::body::{Args, Body, Cells, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId};
 use crate::ir::builtins::BUILTINS;
+use statements::MAX_OPEN_ROUNDS;
 use std::collections::HashMap;
 
 /// What a parameter is traced with.
@@ -34,12 +37,18 @@ pub const ENDLESS: f64 = 1e9;
 const MAX_STEPS: usize = 2_000_000;
 
 /// Traces a body. `bindings` by variable; `ranges` limits globals. `None`: too large.
-pub fn trace(body: &Body, bindings: HashMap<VarId, Binding>, ranges: &[(GlobalVar, Interval)]) -> Option<(Graph, Cid)> {
+/// `hosted`: what scripts ask may be answered in any way.
+pub fn trace(
+    body: &Body,
+    hosted: bool,
+    bindings: HashMap<VarId, Binding>,
+    ranges: &[(GlobalVar, Interval)],
+) -> Option<(Graph, Cid)> {
     let mut graph = Graph::new();
     let zero = graph.push(Node::Int(0));
     let cells = |ty: &Ty| if *ty == Ty::Closure { Held::Closure(Cid(0)) } else { Held::Cells([zero; 3]) };
     let env = body.vars.iter().map(cells).collect();
-    let mut tracer = Tracer { body, graph, bindings, ranges, env, steps: 0, opaque: 0 };
+    let mut tracer = Tracer { body, hosted, graph, bindings, ranges, env, steps: 0, opaque: 0 };
     tracer.block(&body.stmts)?;
     let root = match tracer.env[VarId::CI.index()] {
         Held::Closure(root) => root,
@@ -50,6 +59,7 @@ pub fn trace(body: &Body, bindings: HashMap<VarId, Binding>, ranges: &[(GlobalVa
 
 struct Tracer<'a> {
     body: &'a Body,
+    hosted: bool,
     graph: Graph,
     bindings: HashMap<VarId, Binding>,
     ranges: &'a [(GlobalVar, Interval)],
@@ -66,6 +76,9 @@ impl Tracer<'_> {
                     let value = self.bound(*var).or_else(|| self.run(*root))?;
                     self.env[var.index()] = value;
                 }
+                Stmt::Store { base, len, index, value } => self.store(*base, *len, *index, *value)?,
+                Stmt::Do(deed) => self.deed(deed),
+                Stmt::Loop { before, condition, body, .. } => self.rounds(before, *condition, body, MAX_OPEN_ROUNDS)?,
                 Stmt::If { condition, then, other } => {
                     let Held::Cells([condition, ..]) = self.run(*condition)? else { return None };
                     match self.graph.value(condition) {
@@ -155,6 +168,7 @@ impl Tracer<'_> {
             ExprKind::Const(bits) => self.constant(bits, expr.ty),
             ExprKind::Black => Held::Closure(Cid(0)),
             ExprKind::Var(var) => self.env[var.index()],
+            ExprKind::Element(base, len, index) => self.element(base, len, cells(index)[0]),
             ExprKind::Global(global) => Held::Cells(self.global(global)),
             ExprKind::Op(op, ids) => match op {
                 Op::AddC | Op::MulC | Op::Layer => self.closure(op, of(ids[0]), of(ids[1])),

@@ -4,7 +4,8 @@
 //! expression; a pass over an expression is a loop over its run, however deep the tree. Only statements nest, and the
 //! preprocessor has limited how deep. Names are interned. The tree holds no types beyond those written.
 
-use crate::span::Span;
+use crate::diag::Diagnostic;
+use crate::span::{Source, Span};
 use std::collections::HashMap;
 
 /// An interned name or string.
@@ -50,8 +51,14 @@ pub enum TypeName {
     Point,
     /// `string`
     String,
+    /// `matrix`
+    Matrix,
+    /// `void`
+    Void,
     /// `closure color`
     Closure,
+    /// A struct.
+    Named(Sym),
 }
 
 impl TypeName {
@@ -65,6 +72,7 @@ impl TypeName {
             "normal" => TypeName::Normal,
             "point" => TypeName::Point,
             "string" => TypeName::String,
+            "matrix" => TypeName::Matrix,
             _ => return None,
         })
     }
@@ -113,7 +121,7 @@ macro_rules! binary_ops {
             }
             /// The operator written `text`.
             pub fn from_text(text: &str) -> Option<BinaryOp> {
-                match text { $( $text => Some(BinaryOp::$name), )* _ => None }
+                match text { "and" => Some(BinaryOp::And), "or" => Some(BinaryOp::Or), $( $text => Some(BinaryOp::$name), )* _ => None }
             }
         }
     };
@@ -154,6 +162,21 @@ pub enum ExprKind {
     Index(ExprId, ExprId),
     /// `c.x`; the span covers the name alone.
     Field(ExprId, Sym, Span),
+    /// `{ a, b }`
+    List(Args),
+    /// `++x`, `x--`
+    Step(Step, ExprId),
+    /// `a, b`: the value is that of b.
+    Comma(ExprId, ExprId),
+}
+
+/// How a step counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// `--`
+    pub down: bool,
+    /// Behind its operand: the value is that before the step.
+    pub after: bool,
 }
 
 /// An expression and where it stands.
@@ -165,6 +188,17 @@ pub struct Expr {
     pub span: Span,
 }
 
+/// What stands in the brackets after a declared name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Length {
+    /// No brackets.
+    None,
+    /// `[]`
+    Open,
+    /// `[3]`
+    Given(Root),
+}
+
 /// A declared name with its first value.
 #[derive(Clone, Debug)]
 pub struct Declarator {
@@ -172,6 +206,8 @@ pub struct Declarator {
     pub name: Sym,
     /// Where the name stands.
     pub span: Span,
+    /// Whether it is an array.
+    pub length: Length,
     /// Its first value.
     pub init: Option<Root>,
 }
@@ -194,6 +230,72 @@ pub enum Stmt {
     },
     /// `{ … }`
     Block(Vec<Stmt>),
+    /// `for`, `while`, `do`
+    Loop(Box<Loop>),
+    /// `break;`
+    Break(Span),
+    /// `continue;`
+    Continue(Span),
+    /// `return x;`
+    Return(Option<Root>, Span),
+}
+
+/// A loop.
+#[derive(Clone, Debug)]
+pub struct Loop {
+    /// Where its first word stands.
+    pub span: Span,
+    /// What is done first.
+    pub start: Vec<Stmt>,
+    /// Goes on while it holds; `None`: for ever.
+    pub condition: Option<Root>,
+    /// The body comes before the first test.
+    pub body_first: bool,
+    /// After each round.
+    pub step: Option<Root>,
+    /// What is repeated.
+    pub body: Stmt,
+}
+
+/// A function of the script.
+#[derive(Clone, Debug)]
+pub struct Function {
+    /// Its name.
+    pub name: Sym,
+    /// Where the name stands.
+    pub span: Span,
+    /// What it returns.
+    pub ty: TypeName,
+    /// Its parameters in order; without defaults.
+    pub params: Vec<Param>,
+    /// What it does; `None` for a declaration.
+    pub body: Option<Vec<Stmt>>,
+}
+
+/// A struct of the script.
+#[derive(Clone, Debug)]
+pub struct Struct {
+    /// Its name.
+    pub name: Sym,
+    /// Where the name stands.
+    pub span: Span,
+    /// Its fields in order.
+    pub fields: Vec<(TypeName, Declarator)>,
+}
+
+/// The word a shader begins with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShaderKind {
+    /// `surface`
+    Surface,
+    /// `shader`
+    Generic,
+    /// `displacement`
+    Displacement,
+    /// `volume`
+    Volume,
+    /// `light`
+    Light,
 }
 
 /// One entry of metadata.
@@ -209,7 +311,7 @@ pub struct Metadatum {
     pub span: Span,
 }
 
-/// A declared parameter of a shader.
+/// A declared parameter of a shader or function.
 #[derive(Clone, Debug)]
 pub struct Param {
     /// Declared `output`.
@@ -220,6 +322,8 @@ pub struct Param {
     pub name: Sym,
     /// Where the name stands.
     pub span: Span,
+    /// Whether it is an array.
+    pub length: Length,
     /// Its default value.
     pub default: Option<Root>,
     /// What `[[ ]]` holds.
@@ -229,6 +333,8 @@ pub struct Param {
 /// A shader.
 #[derive(Clone, Debug)]
 pub struct Shader {
+    /// What it computes.
+    pub kind: ShaderKind,
     /// Its name; `None` for bare statements.
     pub name: Option<Sym>,
     /// Where the name stands.
@@ -250,6 +356,14 @@ pub struct Ast {
     pub args: Vec<ExprId>,
     /// The shader.
     pub shader: Option<Shader>,
+    /// Functions in order.
+    pub functions: Vec<Function>,
+    /// Structs in order.
+    pub structs: Vec<Struct>,
+    /// Included files; the first is file 1 of spans.
+    pub sources: Vec<Source>,
+    /// What the preprocessor warns of.
+    pub warnings: Vec<Diagnostic>,
     names: Vec<Box<str>>,
     by_name: HashMap<Box<str>, Sym>,
 }
@@ -268,6 +382,11 @@ impl Ast {
     /// The text of a name or string.
     pub fn name(&self, sym: Sym) -> &str {
         &self.names[sym.0 as usize]
+    }
+
+    /// The [`Sym`] of a text that stands somewhere in the script.
+    pub fn find(&self, text: &str) -> Option<Sym> {
+        self.by_name.get(text).copied()
     }
 
     /// The one [`Sym`] of a text.

@@ -42,19 +42,6 @@ pub const RESERVED: &[&str] = &[
     "while",
 ];
 
-/// Words that begin something that is part of OSL but does not run here.
-const UNSUPPORTED: &[(&str, &str)] = &[
-    ("for", "loops are not supported"),
-    ("while", "loops are not supported"),
-    ("do", "loops are not supported"),
-    ("break", "loops are not supported"),
-    ("continue", "loops are not supported"),
-    ("return", "`return` is not supported"),
-    ("struct", "structs are not supported"),
-    ("matrix", "matrices are not supported"),
-    ("void", "function definitions are not supported"),
-];
-
 /// Whether a statement ended before `at` without its `;`: something new begins on another line, or nothing at all.
 pub fn missing_semicolon(text: &str, at: usize, expected: &[&str]) -> bool {
     let before = text[..at].trim_end().len();
@@ -63,10 +50,6 @@ pub fn missing_semicolon(text: &str, at: usize, expected: &[&str]) -> bool {
 
 /// Says what stands at `at` and what could have stood there.
 pub fn explain(text: &str, at: usize, expected: &[&str]) -> Diagnostic {
-    let range = statement_around(text, at);
-    if let Some(d) = unsupported(text, &range, at) {
-        return d;
-    }
     let before = text[..at].trim_end().len();
     let found = token(text, at);
     if missing_semicolon(text, at, expected) {
@@ -80,29 +63,6 @@ pub fn explain(text: &str, at: usize, expected: &[&str]) -> Diagnostic {
         [one] => d.note(format!("expected {one}")),
         [many @ .., last] => d.note(format!("expected {} or {last}", many.join(", "))),
     }
-}
-
-fn unsupported(text: &str, range: &Range<usize>, at: usize) -> Option<Diagnostic> {
-    let statement = &text[range.clone()];
-    let lead = statement.len() - statement.trim_start().len();
-    let word = token(text, range.start + lead);
-    let start = range.start + lead;
-    if let Some((_, message)) = UNSUPPORTED.iter().find(|(w, _)| *w == word) {
-        return Some(Diagnostic::error("E0109", Span::new(start, start + word.len()), *message));
-    }
-    let before = text[..at].trim_end();
-    if before.ends_with("++") || before.ends_with("--") {
-        let span = Span::new(before.len() - 2, before.len());
-        let d = Diagnostic::error("E0109", span, "`++` and `--` are not supported");
-        return Some(d.help("write `x += 1` or `x -= 1`"));
-    }
-    let typed = super::ast::TypeName::simple(word).is_some() || word == "closure";
-    let message = match token(text, at) {
-        "[" if typed => "arrays are not supported",
-        "(" if typed => "function definitions are not supported",
-        _ => return None,
-    };
-    Some(Diagnostic::error("E0109", Span::new(at, at + token(text, at).len()), message))
 }
 
 /// The word or sign at `at`; empty at the end.

@@ -1,4 +1,4 @@
-//! Checking of calls: functions of the table, and closures with their keyword arguments.
+//! Checking of calls: functions of the script, of the table, and closures.
 
 use super::super::body::{ExprId, ExprKind, Op};
 use super::super::builtins::{self, BUILTINS, Eval};
@@ -6,7 +6,7 @@ use super::super::types::Ty;
 use super::{Checker, Typed, suggest};
 use crate::diag::Diagnostic;
 use crate::lobes;
-use crate::lobes::registry::{Build, Form, ParamSpec, ParamTy, SlotSource};
+use crate::lobes::registry::Form;
 use crate::span::Span;
 use crate::syntax::ast::{self, Sym};
 use std::sync::OnceLock;
@@ -18,9 +18,9 @@ fn built_in() -> &'static [Form] {
 }
 
 /// The arguments of one call.
-struct Given {
-    ids: Vec<ast::ExprId>,
-    typed: Vec<Typed>,
+pub(super) struct Given {
+    pub ids: Vec<ast::ExprId>,
+    pub typed: Vec<Typed>,
 }
 
 impl<'a> Checker<'a> {
@@ -33,13 +33,26 @@ impl<'a> Checker<'a> {
         built_in().iter().chain(self.hosts)
     }
 
-    pub(super) fn call(&mut self, name: Sym, at: Span, args: ast::Args, span: Span) -> Typed {
+    pub(super) fn call(&mut self, name: Sym, at: Span, args: ast::Args, span: Span, wanted: Option<Ty>) -> Typed {
         let ids = self.ast.args(args).to_vec();
         let typed = ids.iter().map(|id| self.of(*id)).collect();
         let given = Given { ids, typed };
         let text = self.ast.name(name);
+        let own = self.function(name, &given, wanted);
+        if let (None, Some(number)) = (&own, self.struct_names.get(&name)) {
+            return self.make_struct(*number, &given, span);
+        }
+        if let Some((cost, index, types)) = own {
+            // The script's own function goes before one of the table unless that fits better.
+            if self.builtin_cost(text, &given).is_none_or(|other| cost <= other * 4 + 3) {
+                return self.inline(index, &types, &given, span);
+            }
+        }
+        if let Some(done) = self.task(text, &given, span, wanted) {
+            return done;
+        }
         let candidates: Vec<&'a Form> = self.forms().filter(|f| f.name == text).collect();
-        if let Some(found) = self.builtin(text, &given, span) {
+        if let Some((_, found)) = self.builtin(text, &given, span, wanted) {
             return found;
         }
         let best =
@@ -47,11 +60,15 @@ impl<'a> Checker<'a> {
         if let Some((_, form)) = best {
             return self.closure(form, &given, span);
         }
-        self.no_match(text, at, &given, &candidates, span)
+        self.no_match(name, at, &given, &candidates, span)
     }
 
-    /// A call of the overload that fits best.
-    fn builtin(&mut self, name: &str, given: &Given, span: Span) -> Option<Typed> {
+    /// How well the table fits a call.
+    fn builtin_cost(&self, name: &str, given: &Given) -> Option<u32> {
+        self.overload(name, given).map(|(cost, ..)| cost)
+    }
+
+    fn overload(&self, name: &str, given: &Given) -> Option<(u32, u16, Ty, Vec<Ty>)> {
         let mut best: Option<(u32, u16, Ty, Vec<Ty>)> = None;
         for index in builtins::overloads(name) {
             for (result, params) in BUILTINS[*index as usize].instances() {
@@ -63,9 +80,41 @@ impl<'a> Checker<'a> {
                 }
             }
         }
-        let (_, index, ty, params) = best?;
+        best
+    }
+
+    /// A function of the table on values that need no conversion.
+    pub(super) fn builtin_by_name(&mut self, name: &str, args: &[ExprId], ty: Ty, span: Span) -> ExprId {
+        let fits = |index: &&u16| {
+            let types: Vec<Ty> = args.iter().map(|id| self.body.expr(*id).ty).collect();
+            BUILTINS[**index as usize].instances().any(|(result, params)| result == ty && params == types)
+        };
+        match builtins::overloads(name).iter().find(fits) {
+            Some(index) => {
+                let args = self.store(args.iter().copied());
+                self.push(ExprKind::Call(*index, args), ty, span).id
+            }
+            None => self.zero(ty, span),
+        }
+    }
+
+    /// A call of the overload that fits best.
+    pub(super) fn builtin(
+        &mut self,
+        name: &str,
+        given: &Given,
+        span: Span,
+        wanted: Option<Ty>,
+    ) -> Option<(u32, Typed)> {
+        let (cost, index, ty, params) = self.overload(name, given)?;
         if given.typed.iter().any(|arg| arg.ty == Ty::Poison) {
-            return Some(self.poison());
+            return Some((cost, self.poison()));
+        }
+        let builtin = &BUILTINS[index as usize];
+        // A noise is as many numbers as its place asks for.
+        let ty = wanted.filter(|wanted| builtin.result_follows_use() && wanted.is_triple()).unwrap_or(ty);
+        if let Some(warning) = builtins::warning(name) {
+            self.diagnostics.push(Diagnostic::warning("W0506", span, warning));
         }
         let mut converted: Vec<ExprId> =
             given.typed.iter().zip(params).map(|(arg, param)| self.convert(*arg, param, span)).collect();
@@ -76,19 +125,20 @@ impl<'a> Checker<'a> {
                     && !options.contains(&self.ast.name(sym))
                 {
                     let d = super::super::passes::needs::unknown_option(self.ast.name(sym), options, span);
-                    return Some(self.error(d));
+                    return Some((cost, self.error(d)));
                 }
                 *value = self.push(ExprKind::OptionIndex(options, *value), Ty::Float, span).id;
             }
         }
-        Some(match BUILTINS[index as usize].eval {
+        let made = match builtin.eval {
             Eval::Global(g) => self.push(ExprKind::Global(g), ty, span),
             Eval::MixClosures => self.mix(converted[0], converted[1], converted[2], span),
             _ => {
                 let args = self.store(converted);
                 self.push(ExprKind::Call(index, args), ty, span)
             }
-        })
+        };
+        Some((cost, made))
     }
 
     fn mix(&mut self, a: ExprId, b: ExprId, x: ExprId, span: Span) -> Typed {
@@ -109,151 +159,18 @@ impl<'a> Checker<'a> {
         form.positional().zip(&given.typed).map(|(p, arg)| arg.ty.distance(Ty::from(p.ty))).sum()
     }
 
-    fn closure(&mut self, form: &Form, given: &Given, span: Span) -> Typed {
-        let positional = form.positional().count();
-        let before = self.diagnostics.len();
-        let mut values: Vec<Option<ExprId>> = vec![None; form.params.len()];
-        let mut args = given.typed.iter().zip(&given.ids);
-        for (value, param) in values.iter_mut().zip(form.params).filter(|(_, p)| !p.keyword) {
-            let Some((arg, id)) = args.next() else { return self.poison() };
-            *value = Some(self.argument(*arg, *id, param));
-        }
-        self.keywords(form, given, positional, &mut values);
-        let poisoned = given.typed.iter().any(|arg| arg.ty == Ty::Poison);
-        if poisoned || self.diagnostics.len() > before {
+    /// Explains why a call fits nothing.
+    fn no_match(&mut self, sym: Sym, at: Span, given: &Given, forms: &[&Form], span: Span) -> Typed {
+        let name = self.ast.name(sym);
+        let overloads = builtins::overloads(name);
+        let own: Vec<u32> = self.functions.get(&sym).cloned().unwrap_or_default();
+        if given.typed.iter().any(|arg| arg.ty == Ty::Poison) && !(overloads.is_empty() && forms.is_empty()) {
             return self.poison();
         }
-        match form.build {
-            Build::Lobe { kind, args } => {
-                let params = kind.spec().params;
-                let ids = self.sources(form, args, params, &values, span);
-                let args = self.store(ids);
-                self.push(ExprKind::Lobe(kind, args), Ty::Closure, span)
-            }
-            Build::Wrap { kind, args, weight, base } => {
-                let params = kind.spec().params;
-                let ids = self.sources(form, args, params, &values, span);
-                let args = self.store(ids);
-                let lobe = self.push(ExprKind::Lobe(kind, args), Ty::Closure, span);
-                let (weight, base) = (self.value(form, &values, weight, span), self.value(form, &values, base, span));
-                let top = self.op(Op::MulC, &[weight, lobe.id], Ty::Closure, span);
-                self.op(Op::Layer, &[top.id, base], Ty::Closure, span)
-            }
-            Build::Layer => {
-                let (top, base) = (self.value(form, &values, 0, span), self.value(form, &values, 1, span));
-                self.op(Op::Layer, &[top, base], Ty::Closure, span)
-            }
-        }
-    }
-
-    /// Reads `"name", value` pairs.
-    fn keywords(&mut self, form: &Form, given: &Given, from: usize, values: &mut [Option<ExprId>]) {
-        let mut at = from;
-        while at < given.ids.len() {
-            let (key, at_key) = (given.ids[at], self.span_of(given.ids[at]));
-            let ast::ExprKind::String(sym) = self.ast.expr(key).kind else {
-                if given.typed[at].ty != Ty::Poison {
-                    let d = Diagnostic::error("E0302", at_key, "expected the name of a keyword argument in quotes");
-                    self.diagnostics.push(d.help(keyword_list(form)));
-                }
-                return;
-            };
-            let name = self.ast.name(sym);
-            let Some(index) = form.params.iter().position(|p| p.keyword && p.name == name) else {
-                let d = Diagnostic::error("E0302", at_key, format!("`{}` has no keyword argument `{name}`", form.name));
-                let like = suggest(name, form.keywords().map(|p| p.name));
-                let help = like.map_or_else(|| keyword_list(form), |like| format!("did you mean `\"{like}\"`?"));
-                self.diagnostics.push(d.help(help));
-                at += 2;
-                continue;
-            };
-            let Some(value) = given.ids.get(at + 1).copied() else {
-                let message = format!("the keyword argument `{name}` has no value");
-                let help = format!("write `\"{name}\", {}`", form.params[index].ty.name());
-                self.diagnostics.push(Diagnostic::error("E0304", at_key, message).help(help));
-                return;
-            };
-            if values[index].is_some() {
-                let message = format!("the keyword argument `{name}` is given twice");
-                self.diagnostics.push(Diagnostic::error("E0304", at_key, message));
-            }
-            let typed = given.typed[at + 1];
-            let param = &form.params[index];
-            if typed.ty.distance(Ty::from(param.ty)).is_none() {
-                let message = format!("`{name}` is {}, not {}", param.ty.name(), typed.ty.name());
-                self.diagnostics.push(Diagnostic::error("E0203", self.span_of(value), message));
-            } else {
-                values[index] = Some(self.argument(typed, value, param));
-            }
-            at += 2;
-        }
-    }
-
-    /// A value for a closure parameter, in the form lobes store: floats, triples, closures.
-    fn argument(&mut self, arg: Typed, id: ast::ExprId, param: &ParamSpec) -> ExprId {
-        let span = self.span_of(id);
-        match param.ty {
-            _ if arg.ty == Ty::Poison => arg.id,
-            ParamTy::Int => self.op(Op::IntToFloat, &[arg.id], Ty::Float, span).id,
-            ParamTy::String => {
-                if let ast::ExprKind::String(sym) = self.ast.expr(id).kind
-                    && !param.options.contains(&self.ast.name(sym))
-                {
-                    let d = super::super::passes::needs::unknown_option(self.ast.name(sym), param.options, span);
-                    return self.error(d).id;
-                }
-                self.push(ExprKind::OptionIndex(param.options, arg.id), Ty::Float, span).id
-            }
-            ty => self.convert(arg, Ty::from(ty), span),
-        }
-    }
-
-    /// One expression per lobe parameter.
-    fn sources(
-        &mut self,
-        form: &Form,
-        sources: &[SlotSource],
-        params: &'static [ParamSpec],
-        values: &[Option<ExprId>],
-        span: Span,
-    ) -> Vec<ExprId> {
-        if sources.is_empty() {
-            return (0..params.len()).map(|i| self.value(form, values, i, span)).collect();
-        }
-        let mut ids = Vec::new();
-        for (source, param) in sources.iter().zip(params) {
-            ids.push(match source {
-                SlotSource::Param(i) => self.value(form, values, *i, span),
-                SlotSource::Const(slots) => self.slots(slots, param.ty, span),
-            });
-        }
-        ids
-    }
-
-    /// What a form's parameter was given, or its default.
-    fn value(&mut self, form: &Form, values: &[Option<ExprId>], index: usize, span: Span) -> ExprId {
-        match values.get(index).copied().flatten() {
-            Some(id) => id,
-            None => {
-                let param = &form.params[index];
-                self.slots(param.default, param.ty, span)
-            }
-        }
-    }
-
-    fn slots(&mut self, slots: &[f32], ty: ParamTy, span: Span) -> ExprId {
-        let ty = if ty.slots() == 3 { Ty::from(ty) } else { Ty::Float };
-        let cell = |i: usize| slots.get(i).or(slots.last()).map_or(0, |x| x.to_bits());
-        self.push(ExprKind::Const([cell(0), cell(1), cell(2)]), ty, span).id
-    }
-
-    /// Explains why a call fits nothing.
-    fn no_match(&mut self, name: &str, at: Span, given: &Given, forms: &[&Form], span: Span) -> Typed {
-        let overloads = builtins::overloads(name);
-        if overloads.is_empty() && forms.is_empty() {
+        if overloads.is_empty() && forms.is_empty() && own.is_empty() && !super::task::is_task(name) {
             return self.unknown_function(name, at);
         }
-        let found: Vec<&str> = given.typed.iter().map(|arg| arg.ty.name()).collect();
+        let found: Vec<String> = given.typed.iter().map(|arg| self.words(arg.ty)).collect();
         if let ([form], true) = (forms, overloads.is_empty())
             && let Some(d) = self.misfit(form, given)
         {
@@ -267,6 +184,8 @@ impl<'a> Checker<'a> {
             .map(|s| format!("`{s}`"))
             .collect();
         let d = Diagnostic::error("E0205", span, message);
+        let d =
+            own.iter().take(6).fold(d, |d, index| d.label(self.ast.functions[*index as usize].span, "declared here"));
         self.error(signatures.iter().fold(d, |d, s| d.help(format!("there is {s}"))))
     }
 
@@ -286,20 +205,13 @@ impl<'a> Checker<'a> {
     }
 
     fn unknown_function(&mut self, name: &str, at: Span) -> Typed {
-        if builtins::UNSUPPORTED.contains(&name) {
-            return self.error(Diagnostic::error("E0109", at, format!("`{name}()` is not supported")));
+        if let Some((_, why)) = builtins::UNSUPPORTED.iter().find(|(n, _)| *n == name) {
+            return self.error(Diagnostic::error("E0109", at, format!("`{name}()` is not supported: {why}")));
         }
         let d = Diagnostic::error("E0206", at, format!("unknown function `{name}`"));
-        let names = self.forms().map(|f| f.name).chain(BUILTINS.iter().map(|b| b.name));
+        let own = self.functions.keys().map(|sym| self.ast.name(*sym));
+        let names = self.forms().map(|f| f.name).chain(BUILTINS.iter().map(|b| b.name)).chain(own);
         let like = suggest(name, names).map(|like| format!("did you mean `{like}`?"));
         self.error(like.into_iter().fold(d, Diagnostic::help))
-    }
-}
-
-fn keyword_list(form: &Form) -> String {
-    let names: Vec<String> = form.keywords().map(|p| format!("`\"{}\"`", p.name)).collect();
-    match names.len() {
-        0 => format!("`{}` takes no keyword arguments", form.name),
-        _ => format!("`{}` takes {}", form.name, names.join(", ")),
     }
 }

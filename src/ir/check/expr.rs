@@ -3,10 +3,13 @@
 use super::super::body::{Args, ExprId, ExprKind, GlobalVar, Op, VarId};
 use super::super::builtins::{BUILTINS, CONSTANTS};
 use super::super::types::Ty;
-use super::{Access, Checker, Typed, suggest};
+use super::call::Given;
+use super::function::{binary_name, unary_name};
+use super::place::{At, Place};
+use super::{Checker, Typed, suggest};
 use crate::diag::Diagnostic;
 use crate::span::Span;
-use crate::syntax::ast::{self, BinaryOp, Sym, TypeName, UnaryOp};
+use crate::syntax::ast::{self, BinaryOp, Sym, UnaryOp};
 
 /// What a name that every shader knows stands for.
 pub(super) enum Global {
@@ -27,11 +30,11 @@ pub(super) fn global(name: &str) -> Option<Global> {
 const ABSENT: &[&str] = &["Ps", "dtime", "dPdtime"];
 
 impl Checker<'_> {
-    /// Checks one expression whose operands have been checked.
-    pub(super) fn expression(&mut self, id: ast::ExprId, statement_level: &[ast::ExprId]) -> Typed {
+    /// Checks one expression whose operands have been checked. `last`: nothing uses its value.
+    pub(super) fn expression(&mut self, id: ast::ExprId, last: bool) -> Typed {
         let ast::Expr { kind, span } = *self.ast.expr(id);
         match kind {
-            ast::ExprKind::Int(value) => self.push(ExprKind::Const([value as u32, 0, 0]), Ty::Int, span),
+            ast::ExprKind::Int(value) => self.int(value, span),
             ast::ExprKind::Float(value) => self.push(ExprKind::Const([value.to_bits(), 0, 0]), Ty::Float, span),
             ast::ExprKind::String(sym) => {
                 let ast = self.ast;
@@ -39,30 +42,34 @@ impl Checker<'_> {
                 self.push(ExprKind::Const([string, 0, 0]), Ty::String, span)
             }
             ast::ExprKind::Name(sym) => self.name(sym, span),
-            ast::ExprKind::Unary(op, a) => self.unary(op, self.of(a), span),
+            ast::ExprKind::Unary(op, a) => self.unary(op, a, span),
             ast::ExprKind::Binary(op, a, b) => self.binary(op, self.of(a), self.of(b), span, (a, b)),
-            ast::ExprKind::Ternary(c, a, b) => self.ternary(c, a, b, span),
-            ast::ExprKind::Call(name, at, args) => self.call(name, at, args, span),
+            ast::ExprKind::Ternary(c, a, b) => {
+                let condition = self.truth(self.of(c), self.span_of(c));
+                self.choose(condition, (self.of(a), self.span_of(a)), (self.of(b), self.span_of(b)), span)
+            }
+            ast::ExprKind::Call(name, at, args) => {
+                let wanted = self.hints.get(&id.0).copied();
+                self.call(name, at, args, span, wanted)
+            }
             ast::ExprKind::Construct(ty, args) => self.construct(ty, args, span),
-            ast::ExprKind::Cast(ty, a) => self.cast(Ty::from(ty), self.of(a), span),
-            ast::ExprKind::Index(a, i) => self.index(self.of(a), self.of(i), i, span),
-            ast::ExprKind::Field(a, name, at) => match (self.of(a), self.field(self.of(a).ty, name, at)) {
-                (a, Some(i)) if a.ty.is_triple() => {
-                    let i = self.int(i, at);
-                    self.op(Op::Component, &[a.id, i.id], Ty::Float, span)
+            ast::ExprKind::Cast(ty, a) => match Ty::simple(ty) {
+                Some(Ty::Matrix) => {
+                    let given = Given { ids: vec![a], typed: vec![self.of(a)] };
+                    self.construct_matrix(&given, span)
                 }
-                _ => self.poison(),
+                ty => self.cast(ty.unwrap_or(Ty::Poison), self.of(a), span),
             },
-            // Chains are in the order they are carried out, so the one at hand is found by its place.
-            ast::ExprKind::Assign(op, target, value)
-                if statement_level.binary_search_by_key(&id.0, |e| e.0).is_ok() =>
-            {
-                self.assignment(op, target, value, span, statement_level.last() == Some(&id))
+            ast::ExprKind::Index(a, i) => self.index(self.of(a), self.of(i), i, span),
+            ast::ExprKind::Field(a, name, at) => self.field_value(self.of(a), name, at, span),
+            ast::ExprKind::List(args) => self.list_value(id, args, span),
+            ast::ExprKind::Step(step, target) => self.step(step, target, span, last),
+            ast::ExprKind::Comma(_, b) => self.of(b),
+            ast::ExprKind::Assign(..) if self.depth == 0 => {
+                let d = Diagnostic::error("E0109", span, "an assignment in a default value is not supported");
+                self.error(d.help("assign in the body of the shader"))
             }
-            ast::ExprKind::Assign(..) => {
-                let d = Diagnostic::error("E0109", span, "an assignment inside an expression is not supported");
-                self.error(d.help("assign in a statement of its own; `==` compares"))
-            }
+            ast::ExprKind::Assign(op, target, value) => self.assignment(op, target, value, span, last),
         }
     }
 
@@ -75,7 +82,7 @@ impl Checker<'_> {
     }
 
     pub(super) fn push(&mut self, kind: ExprKind, ty: Ty, span: Span) -> Typed {
-        Typed { id: self.body.push(kind, ty, span), ty }
+        Typed { id: self.body.push(kind, ty, span), ty, place: None, temp: None }
     }
 
     pub(super) fn op(&mut self, op: Op, operands: &[ExprId], ty: Ty, span: Span) -> Typed {
@@ -84,18 +91,20 @@ impl Checker<'_> {
         self.push(ExprKind::Op(op, ids), ty, span)
     }
 
-    fn int(&mut self, value: i32, span: Span) -> Typed {
-        self.push(ExprKind::Const([value as u32, 0, 0]), Ty::Int, span)
-    }
-
     fn name(&mut self, sym: Sym, span: Span) -> Typed {
-        if let Some(var) = self.names.get(&sym) {
-            return self.push(ExprKind::Var(*var), self.body.vars[var.index()], span);
+        if let Some(binding) = self.names.get(&sym).map(|b| self.bindings[*b]) {
+            if binding.ty == Ty::Poison {
+                return self.poison();
+            }
+            return self.load(binding.place, binding.ty, span);
         }
         let text = self.ast.name(sym);
         match global(text) {
             Some(Global::Read(g)) => self.push(ExprKind::Global(g), g.ty(), span),
-            Some(Global::Ci) => self.push(ExprKind::Var(VarId::CI), Ty::Closure, span),
+            Some(Global::Ci) => {
+                let place = Place { base: VarId::CI, len: 1, at: At::Known(0) };
+                self.load(place, Ty::Closure, span)
+            }
             Some(Global::Number(x)) => self.push(ExprKind::Const([x.to_bits(), 0, 0]), Ty::Float, span),
             None if ABSENT.contains(&text) => {
                 self.error(Diagnostic::error("E0109", span, format!("the global `{text}` is not supported")))
@@ -121,15 +130,23 @@ impl Checker<'_> {
         suggest(text, candidates).map(|name| format!("did you mean `{name}`?"))
     }
 
-    fn unary(&mut self, op: UnaryOp, a: Typed, span: Span) -> Typed {
+    fn unary(&mut self, op: UnaryOp, id: ast::ExprId, span: Span) -> Typed {
+        let a = self.of(id);
+        if let Some(made) = self.overloaded(unary_name(op), &[id], &[a], span) {
+            return made;
+        }
         match (op, a.ty) {
             (_, Ty::Poison) => a,
+            (UnaryOp::Neg, Ty::Matrix) => {
+                let given = Given { ids: vec![id], typed: vec![a] };
+                self.matrix_negated(&given, span)
+            }
             (UnaryOp::Neg, Ty::Int) => self.op(Op::NegI, &[a.id], Ty::Int, span),
             (UnaryOp::Neg, ty) if ty.is_numeric() => self.op(Op::NegF, &[a.id], ty, span),
-            (UnaryOp::Plus, ty) if ty.is_numeric() => a,
+            (UnaryOp::Plus, ty) if ty.is_numeric() => Typed { place: None, ..a },
             (UnaryOp::Not, ty) if ty.is_numeric() => {
-                let truth = Typed { id: self.truth(a, span), ty: Ty::Int };
-                self.op(Op::NotI, &[truth.id], Ty::Int, span)
+                let truth = self.truth(a, span);
+                self.op(Op::NotI, &[truth], Ty::Int, span)
             }
             (UnaryOp::BitNot, Ty::Int) => self.op(Op::BitNotI, &[a.id], Ty::Int, span),
             (UnaryOp::Neg, Ty::Closure) => {
@@ -143,9 +160,25 @@ impl Checker<'_> {
         }
     }
 
-    fn binary(&mut self, op: BinaryOp, a: Typed, b: Typed, span: Span, ids: (ast::ExprId, ast::ExprId)) -> Typed {
+    pub(super) fn binary(
+        &mut self,
+        op: BinaryOp,
+        a: Typed,
+        b: Typed,
+        span: Span,
+        ids: (ast::ExprId, ast::ExprId),
+    ) -> Typed {
         if a.ty == Ty::Poison || b.ty == Ty::Poison {
             return self.poison();
+        }
+        if let Some(made) = self.overloaded(binary_name(op), &[ids.0, ids.1], &[a, b], span) {
+            return made;
+        }
+        if a.ty == Ty::Matrix || b.ty == Ty::Matrix {
+            let given = Given { ids: vec![ids.0, ids.1], typed: vec![a, b] };
+            if let Some(made) = self.matrix_binary(op, &given, span) {
+                return made;
+            }
         }
         if a.ty == Ty::Closure || b.ty == Ty::Closure {
             return self.closure_binary(op, a, b, span, ids);
@@ -164,9 +197,13 @@ impl Checker<'_> {
             }
         };
         found.unwrap_or_else(|| {
-            let message = format!("`{}` does not apply to {} and {}", op.text(), a.ty.name(), b.ty.name());
+            let (left, right) = (self.words(a.ty), self.words(b.ty));
+            let message = format!("`{}` does not apply to {left} and {right}", op.text());
             let mut d = Diagnostic::error("E0204", span, message);
-            d = d.label(self.span_of(ids.0), a.ty.name()).label(self.span_of(ids.1), b.ty.name());
+            d = d.label(self.span_of(ids.0), left).label(self.span_of(ids.1), right);
+            if matches!(a.ty, Ty::Struct(_)) || matches!(b.ty, Ty::Struct(_)) {
+                d = d.help(format!("a function `{}` would say what it does", binary_name(op)));
+            }
             if op == BinaryOp::Rem {
                 d = d.help("`%` is for ints; for floats call `mod(a, b)` or `fmod(a, b)`");
             } else if a.ty.is_triple() && b.ty.is_triple() {
@@ -288,21 +325,48 @@ impl Checker<'_> {
         Some(self.op(op, &[x, y], Ty::Int, span))
     }
 
-    fn ternary(&mut self, c: ast::ExprId, a: ast::ExprId, b: ast::ExprId, span: Span) -> Typed {
-        let condition = self.truth(self.of(c), self.span_of(c));
-        let (x, y) = (self.of(a), self.of(b));
+    /// One of two values.
+    pub(super) fn choose(&mut self, condition: ExprId, a: (Typed, Span), b: (Typed, Span), span: Span) -> Typed {
+        let ((x, a), (y, b)) = (a, b);
         if x.ty == Ty::Poison || y.ty == Ty::Poison {
             return self.poison();
         }
+        if let (Some(from), Some(other)) = (x.place, y.place)
+            && x.ty == y.ty
+            && x.ty.is_aggregate()
+        {
+            return self.choose_parts(condition, from, other, x.ty, span);
+        }
         let ty = if y.ty.distance(x.ty).is_some() { Some(x.ty) } else { x.ty.distance(y.ty).map(|_| y.ty) };
-        let Some(ty) = ty else {
-            let message = format!("the two values of `? :` are {} and {}", x.ty.name(), y.ty.name());
-            let d = Diagnostic::error("E0203", span, message);
-            let d = d.label(self.span_of(a), x.ty.name()).label(self.span_of(b), y.ty.name());
+        let Some(ty) = ty.filter(|ty| *ty != Ty::Void) else {
+            let (left, right) = (self.words(x.ty), self.words(y.ty));
+            let d = Diagnostic::error("E0203", span, format!("the two values of `? :` are {left} and {right}"));
+            let d = d.label(a, left).label(b, right);
             return self.error(d.help("make both the same type"));
         };
         let (x, y) = (self.convert(x, ty, span), self.convert(y, ty, span));
         self.op(Op::Select, &[condition, x, y], ty, span)
+    }
+
+    /// One of two values of several parts.
+    fn choose_parts(&mut self, condition: ExprId, a: Place, b: Place, ty: Ty, span: Span) -> Typed {
+        let condition = self.kept(condition, Ty::Int);
+        self.spill();
+        let place = self.allocate(ty);
+        let (mut to, mut left, mut right) = (Vec::new(), Vec::new(), Vec::new());
+        let (a, b) = (self.pinned(a), self.pinned(b));
+        self.leaves(place, ty, span, &mut to);
+        self.leaves(a, ty, span, &mut left);
+        self.leaves(b, ty, span, &mut right);
+        for ((to, ty), ((a, _), (b, _))) in to.into_iter().zip(left.into_iter().zip(right)) {
+            self.run_start = self.body.exprs.len() as u32;
+            let condition = self.push(ExprKind::Var(condition), Ty::Int, span);
+            let (a, b) = (self.load(a, ty, span), self.load(b, ty, span));
+            let value = self.op(Op::Select, &[condition.id, a.id, b.id], ty, span);
+            self.store_at(to, ty, value.id, span);
+        }
+        self.resume();
+        self.load(place, ty, span)
     }
 
     /// An int that tells whether a value is other than zero.
@@ -312,8 +376,9 @@ impl Checker<'_> {
             Ty::Int => self.op(Op::TruthI, &[a.id], Ty::Int, span).id,
             ty if ty.is_numeric() => self.op(Op::TruthF, &[a.id], Ty::Int, span).id,
             ty => {
-                let message = format!("a condition is a number, not {}", ty.name());
-                let d = Diagnostic::error("E0209", span, message).note(format!("this is {}", ty.name()));
+                let words = self.words(ty);
+                let d = Diagnostic::error("E0209", span, format!("a condition is a number, not {words}"));
+                let d = d.note(format!("this is {words}"));
                 self.error(d.help("compare it with something: `a == b`")).id
             }
         }
@@ -346,214 +411,26 @@ impl Checker<'_> {
         if ty == Ty::Closure && matches!(self.ast.expr(run.root).kind, ast::ExprKind::Int(0)) {
             return self.zero(ty, span);
         }
-        let message = format!("expected {}, found {}", ty.name(), value.ty.name());
-        let d = Diagnostic::error("E0203", span, message).note(format!("this is {}", value.ty.name()));
+        let (wants, has) = (self.words(ty), self.words(value.ty));
+        let d = Diagnostic::error("E0203", span, format!("expected {wants}, found {has}"));
+        let d = d.note(format!("this is {has}"));
         let d = conversion_help(value.ty, ty).into_iter().fold(d, Diagnostic::help);
         self.error(d).id
     }
 
-    fn cast(&mut self, ty: Ty, a: Typed, span: Span) -> Typed {
+    pub(super) fn cast(&mut self, ty: Ty, a: Typed, span: Span) -> Typed {
         match (a.ty, ty) {
             (Ty::Poison, _) => a,
-            (from, to) if from.distance(to).is_some() => Typed { id: self.convert(a, to, span), ty: to },
-            (from, to) if from.is_triple() && to.is_triple() => Typed { id: a.id, ty: to },
+            (from, to) if from.distance(to).is_some() => {
+                Typed { id: self.convert(a, to, span), ty: to, place: None, temp: None }
+            }
+            (from, to) if from.is_triple() && to.is_triple() => Typed { ty: to, place: None, ..a },
             (Ty::Float, Ty::Int) => self.op(Op::FloatToInt, &[a.id], Ty::Int, span),
             (from, to) => {
-                let d = Diagnostic::error("E0203", span, format!("{} cannot become {}", from.name(), to.name()));
+                let message = format!("{} cannot become {}", self.words(from), self.words(to));
+                let d = Diagnostic::error("E0203", span, message);
                 self.error(conversion_help(from, to).into_iter().fold(d, Diagnostic::help))
             }
-        }
-    }
-
-    fn construct(&mut self, name: TypeName, args: ast::Args, span: Span) -> Typed {
-        let ty = Ty::from(name);
-        let ids = self.ast.args(args);
-        let given: Vec<Typed> = ids.iter().map(|id| self.of(*id)).collect();
-        match given[..] {
-            [one] => return self.cast(ty, one, span),
-            [x, y, z] if ty.is_triple() => {
-                let parts = [x, y, z];
-                if let Some(i) = parts.iter().position(|part| part.ty.distance(Ty::Float).is_none()) {
-                    let message = format!("a component of {} is a float, not {}", ty.name(), parts[i].ty.name());
-                    return self.error(Diagnostic::error("E0203", self.span_of(ids[i]), message));
-                }
-                let floats = parts.map(|part| self.convert(part, Ty::Float, span));
-                return self.op(Op::Triple, &floats, ty, span);
-            }
-            [first, ..] if ty.is_triple() && first.ty == Ty::String => {
-                let message = format!("{} with a named space is not supported", ty.name());
-                return self.error(Diagnostic::error("E0109", self.span_of(ids[0]), message));
-            }
-            _ => {}
-        }
-        let d = Diagnostic::error("E0205", span, format!("{} cannot be made from {} values", ty.name(), given.len()));
-        self.error(if ty.is_triple() { d.help("give one value or three") } else { d.help("give one value") })
-    }
-
-    fn index(&mut self, a: Typed, i: Typed, at: ast::ExprId, span: Span) -> Typed {
-        if a.ty == Ty::Poison || i.ty == Ty::Poison {
-            return self.poison();
-        }
-        if !self.check_index(a.ty, i.ty, at, span) {
-            return self.poison();
-        }
-        self.op(Op::Component, &[a.id, i.id], Ty::Float, span)
-    }
-
-    fn check_index(&mut self, ty: Ty, index: Ty, at: ast::ExprId, span: Span) -> bool {
-        let at_span = self.span_of(at);
-        let d = if !ty.is_triple() {
-            Diagnostic::error("E0208", span, format!("{} has no components", ty.name()))
-        } else if index != Ty::Int {
-            Diagnostic::error("E0208", at_span, format!("an index is an int, not {}", index.name()))
-        } else if matches!(self.ast.expr(at).kind, ast::ExprKind::Int(i) if !(0..3).contains(&i)) {
-            Diagnostic::error("E0208", at_span, "there is no such component").help("the components are 0, 1 and 2")
-        } else {
-            return true;
-        };
-        self.diagnostics.push(d);
-        false
-    }
-
-    /// The index of a named component.
-    fn field(&mut self, ty: Ty, name: Sym, at: Span) -> Option<i32> {
-        let text = self.ast.name(name);
-        let names: &[&str] = if ty == Ty::Color { &["r", "g", "b"] } else { &["x", "y", "z"] };
-        let found = names.iter().position(|n| *n == text);
-        match ty {
-            Ty::Poison => None,
-            ty if ty.is_triple() => {
-                if found.is_none() {
-                    let message = format!("{} has no component `{text}`", ty.name());
-                    let d = Diagnostic::error("E0208", at, message);
-                    self.diagnostics.push(d.help(format!("its components are `.{}`", names.join("`, `."))));
-                }
-                found.map(|i| i as i32)
-            }
-            ty => {
-                self.diagnostics.push(Diagnostic::error("E0208", at, format!("{} has no components", ty.name())));
-                None
-            }
-        }
-    }
-
-    /// `target = value`; `last` if nothing else is assigned the result.
-    fn assignment(
-        &mut self,
-        op: Option<BinaryOp>,
-        target: ast::ExprId,
-        value: ast::ExprId,
-        span: Span,
-        last: bool,
-    ) -> Typed {
-        let (base, index) = match self.ast.expr(target).kind {
-            ast::ExprKind::Index(base, index) => (base, Some(index)),
-            ast::ExprKind::Field(base, ..) => (base, Some(target)),
-            _ => (target, None),
-        };
-        let Some((var, ty)) = self.target(base) else { return self.poison() };
-        self.assigned_ci |= var == VarId::CI;
-        let old = self.push(ExprKind::Var(var), ty, self.span_of(base));
-        let Some(at) = index else {
-            let new = self.combined(op, old, target, value, span);
-            let new = self.initial(new, ty, self.span_of(value), ast::Root { first: value.0, root: value });
-            self.assign(var, new);
-            return self.push(ExprKind::Var(var), ty, span);
-        };
-        let Some(index) = self.component_index(ty, target, at) else { return self.poison() };
-        let known = match self.body.expr(index).kind {
-            ExprKind::Const(cells) => Some(cells[0] as i32),
-            _ if !last => {
-                let d = Diagnostic::error("E0109", self.span_of(target), "this cannot be part of a chain");
-                return self.error(d.help("assign in two statements"));
-            }
-            _ => None,
-        };
-        let slot = self.op(Op::Component, &[old.id, index], Ty::Float, span);
-        let new = self.combined(op, slot, target, value, span);
-        let new = self.initial(new, Ty::Float, self.span_of(value), ast::Root { first: value.0, root: value });
-        let whole = self.op(Op::Insert, &[old.id, index, new], ty, span);
-        self.assign(var, whole.id);
-        let now = self.push(ExprKind::Var(var), ty, span);
-        match known {
-            Some(i) => {
-                let i = self.int(i, span);
-                self.op(Op::Component, &[now.id, i.id], Ty::Float, span)
-            }
-            None => now,
-        }
-    }
-
-    /// What `op=` assigns: the old value and the new one under the operator.
-    fn combined(
-        &mut self,
-        op: Option<BinaryOp>,
-        old: Typed,
-        target: ast::ExprId,
-        value: ast::ExprId,
-        span: Span,
-    ) -> Typed {
-        let new = self.of(value);
-        op.map_or(new, |op| self.binary(op, old, new, span, (target, value)))
-    }
-
-    /// The index that an assignment to a component names.
-    fn component_index(&mut self, ty: Ty, target: ast::ExprId, at: ast::ExprId) -> Option<ExprId> {
-        match self.ast.expr(target).kind {
-            ast::ExprKind::Field(_, name, span) => {
-                let names: &[&str] = if ty == Ty::Color { &["r", "g", "b"] } else { &["x", "y", "z"] };
-                let index = names.iter().position(|n| *n == self.ast.name(name))?;
-                ty.is_triple().then(|| self.int(index as i32, span).id)
-            }
-            _ => {
-                let index = self.of(at);
-                if !ty.is_triple() || index.ty != Ty::Int {
-                    // Reported when the target was checked as a value.
-                    return None;
-                }
-                match self.ast.expr(at).kind {
-                    ast::ExprKind::Int(i) => (0..3).contains(&i).then(|| self.int(i, self.span_of(at)).id),
-                    // The value assigned is itself an assignment, which ended the run that the index belongs to.
-                    _ if index.id.0 < self.run_start => {
-                        let d = Diagnostic::error("E0109", self.span_of(target), "this cannot be part of a chain");
-                        self.diagnostics.push(d.help("assign in two statements"));
-                        None
-                    }
-                    _ => Some(index.id),
-                }
-            }
-        }
-    }
-
-    /// The variable an assignment may write.
-    fn target(&mut self, id: ast::ExprId) -> Option<(VarId, Ty)> {
-        let ast::Expr { kind, span } = *self.ast.expr(id);
-        let ast::ExprKind::Name(sym) = kind else {
-            if self.of(id).ty != Ty::Poison {
-                let d = Diagnostic::error("E0207", span, "this cannot be assigned to");
-                self.diagnostics.push(d.help("assign to a variable or to one of its components"));
-            }
-            return None;
-        };
-        let text = self.ast.name(sym);
-        if let Some(var) = self.names.get(&sym).copied() {
-            let variable = &self.variables[var.index()];
-            if variable.access == Access::ReadOnly {
-                let d = Diagnostic::error("E0207", span, format!("the parameter `{text}` cannot be assigned to"));
-                let d = d.label(variable.span, "declared here");
-                self.diagnostics.push(d.help("copy it to a local variable, or declare it `output`"));
-                return None;
-            }
-            return Some((var, self.body.vars[var.index()]));
-        }
-        match global(text) {
-            Some(Global::Ci) => Some((VarId::CI, Ty::Closure)),
-            Some(_) => {
-                let d = Diagnostic::error("E0207", span, format!("`{text}` cannot be assigned to"));
-                self.diagnostics.push(d.help("a surface shader writes `Ci`; copy the rest to local variables"));
-                None
-            }
-            None => None,
         }
     }
 

@@ -4,9 +4,17 @@
 //! out has explicit conversions and closure calls resolved to lobes, and later stages take nothing else. Nothing is
 //! evaluated here but metadata and defaults.
 
+mod assign;
 mod call;
+mod closure;
 mod expr;
+mod function;
+mod parts;
+mod place;
+mod run;
+mod statement;
 mod suggest;
+mod task;
 
 use super::body::{Body, ExprId, ExprKind, Root, Stmt, VarId};
 use super::passes::fold;
@@ -14,16 +22,32 @@ use super::shader::{CheckedShader, ParamDecl, Value};
 use super::types::Ty;
 use crate::diag::Diagnostic;
 use crate::lobes::registry::Form;
-use crate::span::Span;
+use crate::span::{Source, Span};
+use crate::syntax::Limits;
 use crate::syntax::ast::{self, Ast, Sym};
+use function::Frame;
+use place::{At, Layout, Place};
 use std::collections::HashMap;
+use std::sync::Arc;
 pub(super) use suggest::suggest;
 
 /// Checks a parsed script. Ok: the shader and its warnings.
-pub fn check(name: &str, ast: &Ast, hosts: &[Form]) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let mut checker = Checker::new(ast, hosts);
+pub fn check(
+    name: &str,
+    ast: &Ast,
+    hosts: &[Form],
+    limits: &Limits,
+) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let mut checker = Checker::new(ast, hosts, limits);
     let shader = checker.shader(name);
-    let (errors, warnings): (Vec<_>, Vec<_>) = checker.diagnostics.into_iter().partition(Diagnostic::is_error);
+    // A function written out twice is wrong twice; that is said once.
+    let mut said = Vec::new();
+    for d in checker.diagnostics {
+        if !d.message.is_empty() && !said.contains(&d) {
+            said.push(d);
+        }
+    }
+    let (errors, warnings): (Vec<_>, Vec<_>) = said.into_iter().partition(Diagnostic::is_error);
     match shader {
         Some(shader) if errors.is_empty() => Ok((shader, warnings)),
         _ => Err(errors.into_iter().chain(warnings).collect()),
@@ -35,6 +59,10 @@ pub fn check(name: &str, ast: &Ast, hosts: &[Form]) -> Result<(CheckedShader, Ve
 struct Typed {
     id: ExprId,
     ty: Ty,
+    /// Where it lies, if it lies somewhere; of a value of several parts this is all there is.
+    place: Option<Place>,
+    /// The variable it has been put aside in.
+    temp: Option<VarId>,
 }
 
 /// What a script may do with a variable.
@@ -45,27 +73,51 @@ enum Access {
     ReadOnly,
 }
 
-struct Variable {
+/// What a name stands for.
+#[derive(Clone, Copy)]
+struct Binding {
     access: Access,
     span: Span,
     /// Which block declared it, counted from the outermost.
     depth: usize,
+    ty: Ty,
+    place: Place,
 }
 
 struct Checker<'a> {
     ast: &'a Ast,
     /// Closures of the host.
     hosts: &'a [Form],
+    limits: Limits,
     body: Body,
     diagnostics: Vec<Diagnostic>,
     /// The meaning of each syntax expression of the run at hand.
     typed: Vec<Typed>,
+    /// Values that wait for their operator.
+    pending: Vec<ast::ExprId>,
+    /// Types that places ask for.
+    hints: HashMap<u32, Ty>,
+    /// What the assignments of the run write.
+    targets: HashMap<u32, assign::Target>,
     /// Which variable each name stands for now.
-    names: HashMap<Sym, VarId>,
+    names: HashMap<Sym, usize>,
     /// What names stood for outside the blocks that are open.
-    shadowed: Vec<(Sym, Option<VarId>)>,
-    variables: Vec<Variable>,
+    shadowed: Vec<(Sym, Option<usize>)>,
+    bindings: Vec<Binding>,
+    layouts: Vec<Layout>,
+    struct_names: HashMap<Sym, u16>,
+    /// Element and length of each array type.
+    arrays: Vec<(Ty, Option<u32>)>,
+    functions: HashMap<Sym, Vec<u32>>,
+    /// Some function is an operator.
+    has_operators: bool,
+    frame: Frame,
+    /// The functions being written out.
+    stack: Vec<u32>,
+    calls: usize,
+    over_budget: bool,
     depth: usize,
+    chain: usize,
     /// Statements of the block at hand.
     block: Vec<Stmt>,
     /// First expression of the run at hand.
@@ -75,39 +127,61 @@ struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    fn new(ast: &'a Ast, hosts: &'a [Form]) -> Self {
-        let body = Body { vars: vec![Ty::Closure], strings: vec![String::new()], ..Body::default() };
-        let variables = vec![Variable { access: Access::Free, span: Span::default(), depth: 0 }];
-        Checker {
+    fn new(ast: &'a Ast, hosts: &'a [Form], limits: &Limits) -> Self {
+        let vars = vec![Ty::Closure, Ty::Int];
+        let body = Body { vars, strings: vec![String::new()], ..Body::default() };
+        let mut checker = Checker {
             ast,
             hosts,
+            limits: *limits,
             body,
             diagnostics: Vec::new(),
             typed: Vec::new(),
+            pending: Vec::new(),
+            hints: HashMap::new(),
+            targets: HashMap::new(),
             names: HashMap::new(),
             shadowed: Vec::new(),
-            variables,
+            bindings: Vec::new(),
+            layouts: Vec::new(),
+            struct_names: HashMap::new(),
+            arrays: Vec::new(),
+            functions: HashMap::new(),
+            has_operators: false,
+            frame: Frame { ty: Ty::Void, result: None, live: VarId(1), loops: Vec::new() },
+            stack: Vec::new(),
+            calls: 0,
+            over_budget: false,
             depth: 0,
+            chain: 0,
             block: Vec::new(),
             run_start: 0,
             string_ids: HashMap::from([(String::new(), 0)]),
             assigned_ci: false,
-        }
+        };
+        let poison = checker.body.push(ExprKind::Black, Ty::Poison, Span::default());
+        checker.typed = vec![Typed { id: poison, ty: Ty::Poison, place: None, temp: None }; ast.exprs.len()];
+        checker
     }
 
     fn shader(&mut self, file: &str) -> Option<CheckedShader> {
-        let shader = self.ast.shader.as_ref()?;
-        let poison = self.body.push(ExprKind::Black, Ty::Poison, Span::default());
-        self.typed = vec![Typed { id: poison, ty: Ty::Poison }; self.ast.exprs.len()];
+        let ast = self.ast;
+        let shader = ast.shader.as_ref()?;
+        self.diagnostics.extend(ast.warnings.iter().cloned());
+        self.structs();
+        self.functions();
         let metadata = self.metadata(&shader.metadata);
         let mut params = Vec::new();
+        let mut closures = Vec::new();
         for param in &shader.params {
-            params.extend(self.parameter(param));
+            self.parameter(param, &mut params, &mut closures);
         }
+        let count = self.block.len();
+        self.set(self.frame.live, 1);
         self.depth = 1;
-        for stmt in &shader.body {
-            self.statement(stmt);
-        }
+        self.list(&shader.body);
+        self.depth = 0;
+        self.result_of(&closures);
         self.body.stmts = std::mem::take(&mut self.block);
         let name = match shader.name {
             Some(name) => self.ast.name(name).to_owned(),
@@ -120,47 +194,108 @@ impl<'a> Checker<'a> {
         if self.diagnostics.iter().any(Diagnostic::is_error) {
             return None;
         }
-        let mut checked =
-            CheckedShader { name, span: shader.span, params, metadata, body: std::mem::take(&mut self.body) };
-        let known = fold::values_after(&checked.body, checked.params.len());
-        for param in &mut checked.params {
+        let body = std::mem::take(&mut self.body);
+        let sources = ast.sources.iter().map(|s: &Source| Arc::new(s.clone())).collect();
+        let (host, iterations) = (None, self.limits.iterations);
+        let mut checked = CheckedShader { name, span: shader.span, params, metadata, body, sources, host, iterations };
+        let known = fold::values_after(&checked.body, count);
+        for param in checked.params.iter_mut().filter(|p| p.ty != Ty::Closure) {
             param.default =
                 known[param.var.index()].map(|cells| Value::from_cells(param.ty, cells, &checked.body.strings));
         }
         Some(checked)
     }
 
-    fn parameter(&mut self, param: &ast::Param) -> Option<ParamDecl> {
-        let ty = Ty::from(param.ty);
+    /// A shader that leaves its closure in a parameter: the first such is the material if nothing writes `Ci`.
+    fn result_of(&mut self, closures: &[(VarId, bool)]) {
+        let Some((var, _)) = closures.iter().find(|(_, output)| *output).filter(|_| !self.assigned_ci) else { return };
+        self.run_start = self.body.exprs.len() as u32;
+        let value = self.push(ExprKind::Var(*var), Ty::Closure, Span::default());
+        self.assign(VarId::CI, value.id);
+        self.assigned_ci = true;
+    }
+
+    fn parameter(&mut self, param: &ast::Param, out: &mut Vec<ParamDecl>, closures: &mut Vec<(VarId, bool)>) {
         let name = self.ast.name(param.name).to_owned();
-        let value = match param.default {
-            Some(default) => {
-                let value = self.run(default);
-                let at = self.ast.expr(default.root).span;
-                self.initial(value, ty, at, default)
-            }
-            None => {
-                if !param.output {
-                    let d = Diagnostic::error("E0203", param.span, format!("the parameter `{name}` has no default"));
-                    self.diagnostics.push(d.help(format!("give it one: `{} {name} = …`", ty.name())));
-                }
-                self.zero(ty, param.span)
-            }
-        };
+        let given = param.default.and_then(|default| self.list_length(default.root));
+        let ty = self.array_type(param.ty, param.length, given.or(Some(1)), param.span);
+        let value = param.default.map(|default| (default, self.run_for(default, Some(ty))));
+        if param.default.is_none() && !param.output && ty != Ty::Poison {
+            let d = Diagnostic::error("E0203", param.span, format!("the parameter `{name}` has no default"));
+            self.diagnostics.push(d.help(format!("give it one: `{} {name} = …`", self.words(ty))));
+        }
         let access = if param.output { Access::Free } else { Access::ReadOnly };
-        let var = self.declare(param.name, ty, param.span, access);
-        if let Some(var) = var {
-            self.assign(var, value);
+        if ty == Ty::Void {
+            let d = Diagnostic::error("E0203", param.span, "a parameter holds something; `void` is for functions");
+            self.diagnostics.push(d);
+            return;
+        }
+        let simple = match value {
+            Some((default, value)) if !ty.is_aggregate() => {
+                Some(self.initial(value, ty, self.ast.expr(default.root).span, default))
+            }
+            None if !ty.is_aggregate() => {
+                self.run_start = self.body.exprs.len() as u32;
+                Some(self.zero(ty, param.span))
+            }
+            _ => None,
+        };
+        let place = self.declare(param.name, ty, param.span, access);
+        if let Some(place) = place {
+            match (simple, value) {
+                (Some(id), _) => self.store_at(place, ty, id, param.span),
+                (None, Some((default, value))) => {
+                    self.give(place, ty, value, self.ast.expr(default.root).span, default.root);
+                }
+                (None, None) => self.clear(place, ty, param.span),
+            }
         }
         let metadata = self.metadata(&param.metadata);
-        let var = var?;
-        Some(ParamDecl { name, ty, default: None, output: param.output, metadata, span: param.span, var })
+        let Some(place) = place.filter(|_| ty != Ty::Poison) else { return };
+        let mut parts = Vec::new();
+        self.named_parts(&name, place, ty, &mut parts);
+        for (name, var, ty) in parts {
+            if ty == Ty::Closure {
+                closures.push((var, param.output));
+            }
+            let (metadata, span, output) = (metadata.clone(), param.span, param.output);
+            out.push(ParamDecl { name, ty, default: None, output, metadata, span, var });
+        }
+    }
+
+    /// The simple parts of a parameter with their names: `a`, `s.x`, `v[2]`.
+    fn named_parts(&mut self, name: &str, place: Place, ty: Ty, out: &mut Vec<(String, VarId, Ty)>) {
+        match ty {
+            Ty::Struct(number) => {
+                for i in 0..self.layouts[usize::from(number)].fields.len() {
+                    let field = self.ast.name(self.layouts[usize::from(number)].fields[i].0);
+                    let (inner, ty) = self.field_of(number, place, i);
+                    self.named_parts(&format!("{name}.{field}"), inner, ty, out);
+                }
+            }
+            Ty::Matrix | Ty::Array(_) => {
+                let Some((element, count)) = self.elements(ty) else { return };
+                for i in 0..count {
+                    let inner = self.element_of(place, count, At::Known(i), Span::default());
+                    self.named_parts(&format!("{name}[{i}]"), inner, element, out);
+                }
+            }
+            simple => {
+                if let At::Known(i) = place.at {
+                    out.push((name.to_owned(), VarId(place.base.0 + i), simple));
+                }
+            }
+        }
     }
 
     fn metadata(&mut self, entries: &[ast::Metadatum]) -> Vec<(String, Value)> {
         let mut values = Vec::new();
         for entry in entries {
-            let ty = Ty::from(entry.ty);
+            let ty = self.named_type(entry.ty, entry.span);
+            if matches!(self.ast.expr(entry.value.root).kind, ast::ExprKind::List(_)) || ty.is_aggregate() {
+                // Lists in metadata are for user interfaces.
+                continue;
+            }
             let typed = self.run(entry.value);
             let at = self.ast.expr(entry.value.root).span;
             let value = self.initial(typed, ty, at, entry.value);
@@ -182,133 +317,9 @@ impl<'a> Checker<'a> {
         values
     }
 
-    fn statement(&mut self, stmt: &ast::Stmt) {
-        match stmt {
-            ast::Stmt::Declare(ty, declarators) => {
-                for declarator in declarators {
-                    self.local(Ty::from(*ty), declarator);
-                }
-            }
-            ast::Stmt::Expr(root) => {
-                let typed = self.run(*root);
-                let ast::Expr { kind, span } = *self.ast.expr(root.root);
-                if !matches!(kind, ast::ExprKind::Assign(..)) && typed.ty != Ty::Poison {
-                    let d = Diagnostic::warning("W0502", span, "this statement has no effect");
-                    self.diagnostics.push(match typed.ty {
-                        Ty::Closure => d.help("to make it part of the material write `Ci = …` or `Ci += …`"),
-                        _ => d,
-                    });
-                }
-            }
-            ast::Stmt::If { condition, then, other } => {
-                let value = self.run(*condition);
-                let at = self.ast.expr(condition.root).span;
-                let root = self.truth(value, at);
-                let condition = Root { first: self.run_start, root };
-                let then = self.inner_block(std::slice::from_ref(&**then));
-                let other = other.as_deref().map_or_else(Vec::new, |s| self.inner_block(std::slice::from_ref(s)));
-                self.block.push(Stmt::If { condition, then, other });
-            }
-            ast::Stmt::Block(stmts) => {
-                let block = self.inner_block(stmts);
-                self.block.extend(block);
-            }
-        }
-    }
-
-    fn inner_block(&mut self, stmts: &[ast::Stmt]) -> Vec<Stmt> {
-        let outer = std::mem::take(&mut self.block);
-        let mark = self.shadowed.len();
-        self.depth += 1;
-        for stmt in stmts {
-            self.statement(stmt);
-        }
-        self.depth -= 1;
-        while self.shadowed.len() > mark {
-            match self.shadowed.pop() {
-                Some((name, Some(var))) => self.names.insert(name, var),
-                Some((name, None)) => self.names.remove(&name),
-                None => None,
-            };
-        }
-        std::mem::replace(&mut self.block, outer)
-    }
-
-    fn local(&mut self, ty: Ty, declarator: &ast::Declarator) {
-        let value = match declarator.init {
-            Some(init) => {
-                let value = self.run(init);
-                let at = self.ast.expr(init.root).span;
-                self.initial(value, ty, at, init)
-            }
-            None => {
-                self.run_start = self.body.exprs.len() as u32;
-                self.zero(ty, declarator.span)
-            }
-        };
-        if let Some(var) = self.declare(declarator.name, ty, declarator.span, Access::Free) {
-            self.assign(var, value);
-        }
-    }
-
-    /// A new variable, unless this block has one of that name.
-    fn declare(&mut self, name: Sym, ty: Ty, span: Span, access: Access) -> Option<VarId> {
-        let text = self.ast.name(name);
-        if let Some(earlier) = self.names.get(&name).map(|v| &self.variables[v.index()])
-            && earlier.depth == self.depth
-        {
-            let d = Diagnostic::error("E0202", span, format!("`{text}` is declared twice"));
-            self.diagnostics.push(d.label(earlier.span, "first here").help("give one of them another name"));
-            return None;
-        }
-        if expr::global(text).is_some() {
-            let d = Diagnostic::error("E0202", span, format!("`{text}` is a global of every shader"));
-            self.diagnostics.push(d.help("give the variable another name"));
-            return None;
-        }
-        let var = VarId(self.body.vars.len() as u32);
-        self.body.vars.push(ty);
-        self.variables.push(Variable { access, span, depth: self.depth });
-        self.shadowed.push((name, self.names.insert(name, var)));
-        Some(var)
-    }
-
     fn assign(&mut self, var: VarId, value: ExprId) {
         self.block.push(Stmt::Assign(var, Root { first: self.run_start, root: value }));
         self.run_start = self.body.exprs.len() as u32;
-    }
-
-    /// What a variable without a first value holds: zero, black, the empty string.
-    fn zero(&mut self, ty: Ty, span: Span) -> ExprId {
-        let kind = if ty == Ty::Closure { ExprKind::Black } else { ExprKind::Const([0; 3]) };
-        self.body.push(kind, ty, span)
-    }
-
-    /// Checks the expressions of a run in order and returns the last.
-    fn run(&mut self, run: ast::Root) -> Typed {
-        self.run_start = self.body.exprs.len() as u32;
-        let statement_level = self.assignment_chain(run);
-        for id in run.first..=run.root.0 {
-            let typed = self.expression(ast::ExprId(id), &statement_level);
-            self.typed[id as usize] = typed;
-        }
-        self.typed[run.root.0 as usize]
-    }
-
-    /// The assignments of `a = b = c`, which may stand where a statement does.
-    fn assignment_chain(&self, run: ast::Root) -> Vec<ast::ExprId> {
-        let mut chain = Vec::new();
-        if self.depth == 0 {
-            // Defaults and metadata are values.
-            return chain;
-        }
-        let mut at = run.root;
-        while let ast::ExprKind::Assign(_, _, value) = self.ast.expr(at).kind {
-            chain.push(at);
-            at = value;
-        }
-        chain.reverse();
-        chain
     }
 
     fn string(&mut self, text: &str) -> u32 {
@@ -327,7 +338,7 @@ impl<'a> Checker<'a> {
     }
 
     fn poison(&self) -> Typed {
-        Typed { id: ExprId(0), ty: Ty::Poison }
+        Typed { id: ExprId(0), ty: Ty::Poison, place: None, temp: None }
     }
 }
 

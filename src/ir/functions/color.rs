@@ -114,6 +114,49 @@ fn from_hsl([h, s, l]: Rgb) -> Rgb {
     saturated(h).map(|x| l + chroma * (x - 0.5))
 }
 
+/// The CIE 1931 2° observer at a wavelength in nanometres; Wyman, Sloan & Shirley 2013, multi-lobe fit.
+fn observer(nm: f32) -> Rgb {
+    let lobe = |scale: f32, mean: f32, below: f32, above: f32| {
+        let t = (nm - mean) * if nm < mean { below } else { above };
+        scale * (-0.5 * t * t).exp()
+    };
+    [
+        lobe(0.362, 442.0, 0.0624, 0.0374) + lobe(1.056, 599.8, 0.0264, 0.0323) + lobe(-0.065, 501.1, 0.0490, 0.0382),
+        lobe(0.821, 568.8, 0.0213, 0.0247) + lobe(0.286, 530.9, 0.0613, 0.0322),
+        lobe(1.217, 437.0, 0.0845, 0.0278) + lobe(0.681, 459.0, 0.0385, 0.0725),
+    ]
+}
+
+fn from_xyz(xyz: Rgb) -> Rgb {
+    let space = SPACES.iter().position(|s| *s == "XYZ").unwrap_or(0);
+    transform(space, 0, xyz).map(|x| x.max(0.0))
+}
+
+/// What a black body of so many kelvin gives off, in W/m²: Planck's law under the observer, negative parts cut.
+pub fn blackbody(kelvin: f32) -> Rgb {
+    if kelvin.is_nan() || kelvin <= 0.0 {
+        return [0.0; 3];
+    }
+    let mut xyz = [0.0f64; 3];
+    for step in 0..=80 {
+        let nm = 380.0 + 5.0 * step as f64;
+        let metres = nm * 1e-9;
+        let power = 3.7418e-16 * metres.powi(-5) / ((1.4388e-2 / (metres * f64::from(kelvin))).exp() - 1.0);
+        for (sum, weight) in xyz.iter_mut().zip(observer(nm as f32)) {
+            *sum += power * f64::from(weight) * 5e-9;
+        }
+    }
+    from_xyz(xyz.map(|x| x as f32)).map(|x| if x.is_finite() { x } else { f32::MAX })
+}
+
+/// The color of light of one wavelength in nanometres, scaled as OSL does so that no channel exceeds 1.
+pub fn wavelength(nm: f32) -> Rgb {
+    if !nm.is_finite() {
+        return [0.0; 3];
+    }
+    from_xyz(observer(nm)).map(|x| x / 2.52)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,4 +1,6 @@
 //! The longer functions of the table, by subject.
 
 pub mod color;
+pub mod matrix;
 pub mod noise;
+pub mod text;

@@ -5,23 +5,31 @@
 //! weight of zero makes black are gone. The folder walks statements in order and remembers what each variable holds;
 //! after a branch it remembers what both ways agree on.
 
-use super::super::body::{Args, Body, Cells, Expr, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId};
+use super::super::body::{
+    Args, Body, Cells, Deed, Expr, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId, each_written,
+};
 use super::super::builtins::{BUILTINS, MAX_ARGS};
 use super::super::ops;
+use super::super::tasks::{Strings, Surroundings, Task};
 use super::super::types::Ty;
 use super::env::Env;
+use crate::globals::Globals;
+use crate::span::Span;
 
-/// Folds a body. `known` holds, by variable, the values of parameters that are set.
-pub fn fold(body: &Body, known: &[Option<Cells>]) -> Body {
+/// Folds a body. `known` holds, by variable, the values of parameters that are set; `hosted`: someone will be there to
+/// answer questions.
+pub fn fold(body: &Body, known: &[Option<Cells>], hosted: bool) -> Body {
     let mut folder = Folder::new(body, known);
+    folder.hosted = hosted;
     let stmts = folder.block(&body.stmts);
     folder.new.stmts = stmts;
     folder.new
 }
 
 /// Folds a body without using the initial values of the variables in `open`: what is left reads them at every point.
-pub fn fold_open(body: &Body, open: &[VarId]) -> Body {
+pub fn fold_open(body: &Body, open: &[VarId], hosted: bool) -> Body {
     let mut folder = Folder::new(body, &[]);
+    folder.hosted = hosted;
     folder.open = open.to_vec();
     let stmts = folder.block(&body.stmts);
     folder.new.stmts = stmts;
@@ -65,6 +73,9 @@ struct Folder<'a> {
     /// Parameters whose initial value is not to be used.
     open: Vec<VarId>,
     env: Env<Option<Known>>,
+    hosted: bool,
+    /// Expressions that may still be looked at for the sake of unrolling.
+    unrolling: usize,
     /// The new expression of each old one of the run at hand, from `origin` on.
     map: Vec<ExprId>,
     origin: usize,
@@ -75,7 +86,17 @@ impl<'a> Folder<'a> {
         let new = Body { vars: old.vars.clone(), strings: old.strings.clone(), ..Body::default() };
         let mut env = Env::new(old.vars.len(), None);
         env.set(VarId::CI, Some(Known::Black));
-        Folder { old, new, fixed: fixed.to_vec(), open: Vec::new(), env, map: Vec::new(), origin: 0 }
+        Folder {
+            old,
+            new,
+            fixed: fixed.to_vec(),
+            open: Vec::new(),
+            env,
+            hosted: false,
+            unrolling: MAX_UNROLLING,
+            map: Vec::new(),
+            origin: 0,
+        }
     }
 
     fn block(&mut self, stmts: &[Stmt]) -> Vec<Stmt> {
@@ -103,6 +124,14 @@ impl<'a> Folder<'a> {
                     self.env.set(*var, if open.is_some() { None } else { known });
                     out.push(Stmt::Assign(*var, root));
                 }
+                Stmt::Store { base, len, index, value } => self.store(stmt, *base, *len, *index, *value, out),
+                Stmt::Do(deed) => self.deed(deed, out),
+                Stmt::Loop { before, condition, body, span } => {
+                    if !self.unrolled(before, *condition, body, out) {
+                        let (before, condition, body) = self.repeated(before, *condition, body);
+                        out.push(Stmt::Loop { before, condition, body, span: *span });
+                    }
+                }
                 Stmt::If { condition, then, other } => {
                     let condition = self.run(*condition);
                     match self.new.expr(condition.root).kind {
@@ -112,6 +141,116 @@ impl<'a> Folder<'a> {
                 }
             }
         }
+    }
+
+    fn store(&mut self, stmt: &Stmt, base: VarId, len: u32, index: VarId, value: VarId, out: &mut Vec<Stmt>) {
+        if let Some(Known::Const(cells)) = self.env.get(index) {
+            let at = (cells[0] as i32).clamp(0, len as i32 - 1) as u32;
+            let known = self.env.get(value);
+            let root = self.read(value, known);
+            self.env.set(VarId(base.0 + at), known);
+            return out.push(Stmt::Assign(VarId(base.0 + at), root));
+        }
+        (0..len).for_each(|i| self.env.set(VarId(base.0 + i), None));
+        out.push(stmt.clone());
+    }
+
+    /// A run that reads one variable.
+    fn read(&mut self, var: VarId, known: Option<Known>) -> Root {
+        let kind = match known {
+            Some(Known::Const(cells)) => ExprKind::Const(cells),
+            Some(Known::Global(g)) => ExprKind::Global(g),
+            Some(Known::Black) => ExprKind::Black,
+            None => ExprKind::Var(var),
+        };
+        let root = self.new.push(kind, self.new.vars[var.index()], Span::default());
+        Root { first: root.0, root }
+    }
+
+    fn deed(&mut self, deed: &Deed, out: &mut Vec<Stmt>) {
+        if deed.task.is_heard() && !self.hosted {
+            return;
+        }
+        let asked = deed.task.asks_host() && self.hosted;
+        if let (Task::Between(_), false) = (deed.task, asked) {
+            // Without a host every space is the same.
+            let known = self.env.get(deed.args[2]);
+            let root = self.read(deed.args[2], known);
+            self.env.set(deed.outs[0], known);
+            return out.push(Stmt::Assign(deed.outs[0], root));
+        }
+        let known: Option<Vec<(Ty, Cells)>> = deed
+            .args
+            .iter()
+            .map(|arg| match self.env.get(*arg) {
+                Some(Known::Const(cells)) => Some((self.new.vars[arg.index()], cells)),
+                _ => None,
+            })
+            .collect();
+        let known = known.filter(|_| !asked);
+        let Some(args) = known else {
+            deed.outs.iter().for_each(|var| self.env.set(*var, None));
+            return out.push(Stmt::Do(Box::new(deed.clone())));
+        };
+        let mut results: Vec<(Ty, Cells)> = deed.outs.iter().map(|var| (self.new.vars[var.index()], [0; 3])).collect();
+        let known_strings = std::mem::take(&mut self.new.strings);
+        let mut strings = Strings::new(&known_strings);
+        match deed.task {
+            // All that is known is constant.
+            Task::IsConstant => results[0].1 = [1, 0, 0],
+            task => {
+                let globals = Globals::default();
+                task.run(
+                    &args,
+                    &mut Surroundings { strings: &mut strings, host: None, globals: &globals },
+                    &mut results,
+                );
+            }
+        }
+        let made = strings.into_made();
+        self.new.strings = known_strings;
+        self.new.strings.extend(made);
+        for (var, (ty, cells)) in deed.outs.iter().zip(results) {
+            let root = self.new.push(ExprKind::Const(cells), ty, deed.span);
+            self.env.set(*var, Some(Known::Const(cells)));
+            out.push(Stmt::Assign(*var, Root { first: root.0, root }));
+        }
+    }
+
+    /// Writes out the rounds of a loop whose number is known; false, and nothing done, if it is not known or too large.
+    fn unrolled(&mut self, before: &[Stmt], condition: Root, body: &[Stmt], out: &mut Vec<Stmt>) -> bool {
+        let (mark, length) = (self.env.enter(), out.len());
+        let (exprs, args) = (self.new.exprs.len(), self.new.args.len());
+        for _ in 0..MAX_ROUNDS {
+            self.block_into(before, out);
+            let condition = self.run(condition);
+            match self.new.expr(condition.root).kind {
+                ExprKind::Const(cells) if cells[0] == 0 => return true,
+                ExprKind::Const(_) => self.block_into(body, out),
+                _ => break,
+            }
+            if self.unrolling == 0 || self.new.exprs.len() - exprs > MAX_UNROLLED {
+                break;
+            }
+        }
+        self.env.leave(mark);
+        out.truncate(length);
+        self.new.exprs.truncate(exprs);
+        self.new.args.truncate(args);
+        false
+    }
+
+    /// A loop with any number of rounds: what it writes is unknown at the start of each.
+    fn repeated(&mut self, before: &[Stmt], condition: Root, body: &[Stmt]) -> (Vec<Stmt>, Root, Vec<Stmt>) {
+        for part in [before, body] {
+            each_written(part, &mut |var| self.env.set(var, None));
+        }
+        let before = self.block(before);
+        let condition = self.run(condition);
+        let mark = self.env.enter();
+        let body = self.block(body);
+        self.env.leave(mark);
+        (before, condition, body)
     }
 
     /// A parameter that is set has that value in place of its default.
@@ -134,6 +273,7 @@ impl<'a> Folder<'a> {
 
     fn run(&mut self, run: Root) -> Root {
         let first = self.new.exprs.len() as u32;
+        self.unrolling = self.unrolling.saturating_sub((run.root.0 - run.first.min(run.root.0)) as usize + 1);
         self.origin = run.first as usize;
         self.map.clear();
         for id in run.first..=run.root.0 {
@@ -174,6 +314,21 @@ impl<'a> Folder<'a> {
                 known.map_or(ExprKind::OptionIndex(options, name), |i| ExprKind::Const([(i as f32).to_bits(), 0, 0]))
             }
             ExprKind::Lobe(kind, args) => ExprKind::Lobe(kind, self.args(args)),
+            ExprKind::Element(base, len, index) => {
+                let index = self.of(index);
+                match self.value(index) {
+                    Some(cells) => {
+                        let var = VarId(base.0 + (cells[0] as i32).clamp(0, len as i32 - 1) as u32);
+                        match self.env.get(var) {
+                            Some(Known::Const(cells)) => ExprKind::Const(cells),
+                            Some(Known::Global(g)) => ExprKind::Global(g),
+                            Some(Known::Black) => ExprKind::Black,
+                            None => ExprKind::Var(var),
+                        }
+                    }
+                    None => ExprKind::Element(base, len, index),
+                }
+            }
         };
         self.new.push(kind, ty, span)
     }
@@ -253,6 +408,13 @@ impl<'a> Folder<'a> {
         Folded::Kind(ExprKind::Const(ops::apply(op, n, values[0], values[1], values[2])))
     }
 }
+
+/// Rounds of a loop that are written out, at most.
+const MAX_ROUNDS: usize = 256;
+/// Expressions that one loop may come to when written out.
+const MAX_UNROLLED: usize = 1 << 13;
+/// Expressions looked at with a view to writing out loops, in one program.
+const MAX_UNROLLING: usize = 1 << 18;
 
 enum Folded {
     /// An expression that is there already.

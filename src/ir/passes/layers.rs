@@ -1,6 +1,6 @@
 //! Which lobes a script may lay over which.
 
-use super::super::body::{Body, ExprId, ExprKind, Op, Root, Stmt};
+use super::super::body::{Body, ExprId, ExprKind, Op, Root, Stmt, VarId, each_written};
 use super::super::types::Ty;
 use super::each_used;
 use super::env::Env;
@@ -63,6 +63,17 @@ impl Trace<'_> {
                         self.vars.set(*var, self.of_expr[root.root.index()]);
                     }
                 }
+                Stmt::Store { base, len, value, .. } => {
+                    if self.body.vars[base.index()] == Ty::Closure {
+                        let new = self.vars.get(*value);
+                        for var in (0..*len).map(|i| VarId(base.0 + i)) {
+                            let either = push(&self.values, Value::Either(self.vars.get(var), new));
+                            self.vars.set(var, either);
+                        }
+                    }
+                }
+                Stmt::Do(_) => {}
+                Stmt::Loop { before, body, .. } => self.rounds(before, body),
                 Stmt::If { then, other, .. } => {
                     let [then, other] = [then, other].map(|way| {
                         let mark = self.vars.enter();
@@ -74,6 +85,34 @@ impl Trace<'_> {
                     self.vars.join(&then, &other, join);
                 }
             }
+        }
+    }
+
+    /// What a loop writes is, at the start of a round, what it was before or what a round left.
+    fn rounds(&mut self, before: &[Stmt], body: &[Stmt]) {
+        let mut written = BTreeSet::new();
+        for part in [before, body] {
+            each_written(part, &mut |var| {
+                if self.body.vars[var.index()] == Ty::Closure {
+                    written.insert(var.0);
+                }
+            });
+        }
+        let mut starts = Vec::new();
+        for var in written.into_iter().map(VarId) {
+            let start = push(&self.values, Value::Either(self.vars.get(var), 0));
+            self.vars.set(var, start);
+            starts.push((var, start));
+        }
+        self.block(before);
+        let after: Vec<usize> = starts.iter().map(|(var, _)| self.vars.get(*var)).collect();
+        self.block(body);
+        for ((var, start), after) in starts.into_iter().zip(after) {
+            let left = self.vars.get(var);
+            if let Some(Value::Either(_, again)) = self.values.borrow_mut().get_mut(start) {
+                *again = left;
+            }
+            self.vars.set(var, after);
         }
     }
 
@@ -92,6 +131,10 @@ impl Trace<'_> {
         let at = |id: ExprId| self.of_expr[id.index()];
         let value = match kind {
             ExprKind::Var(var) => return self.vars.get(var),
+            ExprKind::Element(base, len, _) => {
+                let elements = (0..len).map(|i| self.vars.get(VarId(base.0 + i)));
+                return elements.fold(0, |a, b| if a == b { a } else { push(&self.values, Value::Either(a, b)) });
+            }
             ExprKind::Lobe(..) => Value::Lobe(id),
             ExprKind::Op(Op::MulC, [_, c, _]) => Value::Weighted(at(c)),
             ExprKind::Op(Op::AddC, [a, b, _]) => Value::Sum(at(a), at(b)),

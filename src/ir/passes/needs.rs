@@ -15,6 +15,8 @@ pub struct Needs {
     pub globals: BTreeSet<GlobalVar>,
     /// Whether a global is read for more than the frame of a lobe.
     pub varying: bool,
+    /// Whether live code asks the host anything.
+    pub asks: bool,
     /// Which expressions live code uses, by index.
     pub used: Vec<bool>,
     /// Options that turned out to be unknown.
@@ -22,12 +24,14 @@ pub struct Needs {
 }
 
 /// Looks through live code.
-pub fn needs(body: &Body) -> Needs {
+pub fn needs(body: &Body, hosted: bool) -> Needs {
     let mut needs = Needs { used: vec![false; body.exprs.len()], ..Needs::default() };
     // Uses of each expression other than as the normal or tangent of a lobe.
     let mut valued = vec![false; body.exprs.len()];
     let mut scratch = Vec::new();
     look(body, &body.stmts, &mut needs, &mut valued, &mut scratch);
+    // What a host answers may differ from point to point.
+    needs.varying |= needs.asks && hosted;
     needs
 }
 
@@ -35,6 +39,13 @@ fn look(body: &Body, stmts: &[Stmt], needs: &mut Needs, valued: &mut [bool], scr
     for stmt in stmts {
         match stmt {
             Stmt::Assign(_, root) => run(body, *root, needs, valued, scratch),
+            Stmt::Store { .. } => {}
+            Stmt::Do(deed) => needs.asks |= deed.task.asks_host(),
+            Stmt::Loop { before, condition, body: inner, .. } => {
+                look(body, before, needs, valued, scratch);
+                run(body, *condition, needs, valued, scratch);
+                look(body, inner, needs, valued, scratch);
+            }
             Stmt::If { condition, then, other } => {
                 run(body, *condition, needs, valued, scratch);
                 look(body, then, needs, valued, scratch);

@@ -1,0 +1,580 @@
+//! Calls that become statements: matrices, strings, messages, questions to the host.
+
+use super::super::body::{Deed, ExprId, ExprKind, Op, Stmt, VarId};
+use super::super::functions::matrix::Kind;
+use super::super::host::Speech;
+use super::super::tasks::Task;
+use super::super::types::Ty;
+use super::call::Given;
+use super::place::{At, Place};
+use super::{Checker, Typed};
+use crate::diag::Diagnostic;
+use crate::span::Span;
+use crate::syntax::ast;
+
+/// What is called by these names becomes statements.
+const TASKS: &[&str] = &[
+    "arraylength",
+    "concat",
+    "determinant",
+    "endswith",
+    "error",
+    "format",
+    "getattribute",
+    "getchar",
+    "getmatrix",
+    "hash",
+    "isconnected",
+    "isconstant",
+    "printf",
+    "raytype",
+    "sincos",
+    "spline",
+    "split",
+    "startswith",
+    "stof",
+    "stoi",
+    "strlen",
+    "substr",
+    "texture",
+    "transform",
+    "transpose",
+    "warning",
+    "exit",
+    "inverse",
+];
+
+/// Whether a call of `name` may become statements.
+pub(super) fn is_task(name: &str) -> bool {
+    TASKS.contains(&name)
+}
+
+impl Checker<'_> {
+    /// A call that becomes statements; `None` if it is none, or fits none.
+    pub(super) fn task(&mut self, name: &str, given: &Given, span: Span, wanted: Option<Ty>) -> Option<Typed> {
+        if !is_task(name) {
+            return None;
+        }
+        if given.typed.iter().any(|arg| arg.ty == Ty::Poison) {
+            return Some(self.poison());
+        }
+        let types: Vec<Ty> = given.typed.iter().map(|arg| arg.ty).collect();
+        use Ty::{Float, Int, Matrix, String as Text};
+        let simple = |task, wants: &[Ty], result| Some((task, wants.to_vec(), result));
+        let found: Option<(Task, Vec<Ty>, Ty)> = match (name, &types[..]) {
+            ("strlen", [Text]) => simple(Task::Length, &[Text], Int),
+            ("startswith", [Text, Text]) => simple(Task::StartsWith, &[Text, Text], Int),
+            ("endswith", [Text, Text]) => simple(Task::EndsWith, &[Text, Text], Int),
+            ("stoi", [Text]) => simple(Task::ToInt, &[Text], Int),
+            ("stof", [Text]) => simple(Task::ToFloat, &[Text], Float),
+            ("getchar", [Text, Int]) => simple(Task::Char, &[Text, Int], Int),
+            ("hash", [Text]) => simple(Task::Hash, &[Text], Int),
+            ("substr", [Text, Int, Int]) => simple(Task::Part, &[Text, Int, Int], Text),
+            ("raytype", [Text]) => simple(Task::RayType, &[Text], Int),
+            ("determinant", [Matrix]) => simple(Task::Determinant, &[Matrix], Float),
+            ("transpose", [Matrix]) => simple(Task::Transpose, &[Matrix], Matrix),
+            ("inverse", [Matrix]) => simple(Task::Inverse, &[Matrix], Matrix),
+            ("transform", [Matrix, triple]) if triple.is_spatial() => {
+                simple(Task::Transform(kind(*triple)), &[Matrix, *triple], *triple)
+            }
+            ("transform", [Text, Text, triple]) if triple.is_spatial() => {
+                simple(Task::Between(kind(*triple)), &[Text, Text, *triple], *triple)
+            }
+            ("concat" | "format", [Text, ..]) => {
+                let task = if name == "concat" { Task::Concat } else { Task::Format };
+                (name == "format" || types.iter().all(|ty| *ty == Text)).then(|| (task, types.clone(), Text))
+            }
+            ("printf" | "warning" | "error", [Text, ..]) => {
+                let speech = match name {
+                    "printf" => Speech::Print,
+                    "warning" => Speech::Warning,
+                    _ => Speech::Error,
+                };
+                Some((Task::Say(speech), types.clone(), Ty::Void))
+            }
+            ("isconstant", [one]) if !one.is_aggregate() => Some((Task::IsConstant, types.clone(), Int)),
+            _ => None,
+        };
+        if let Some((task, wants, result)) = found {
+            return Some(self.plain(task, given, &wants, result, span));
+        }
+        self.odd_task(name, given, &types, span, wanted)
+    }
+
+    fn odd_task(&mut self, name: &str, given: &Given, types: &[Ty], span: Span, wanted: Option<Ty>) -> Option<Typed> {
+        use Ty::{Float, Int, Matrix, String as Text};
+        match (name, types) {
+            ("arraylength", [Ty::Array(number)]) => {
+                let length = self.arrays[usize::from(*number)].1.unwrap_or(0);
+                Some(self.int(length as i32, span))
+            }
+            ("isconnected", [_]) => {
+                let name = match self.ast.expr(given.ids[0]).kind {
+                    ast::ExprKind::Name(sym) => self.ast.name(sym).to_owned(),
+                    _ => String::new(),
+                };
+                self.spill();
+                let name = self.text(&name, span);
+                Some(self.result(Task::IsConnected, vec![name], Int, span))
+            }
+            ("transform", [Text, triple]) if triple.is_spatial() => {
+                self.aside(given);
+                let from = self.text("common", span);
+                let to = self.value_of(given, 0, Text);
+                let value = self.value_of(given, 1, *triple);
+                Some(self.result(Task::Between(kind(*triple)), vec![from, to, value], *triple, span))
+            }
+            ("getmatrix", [Text, Matrix] | [Text, Text, Matrix]) => {
+                self.aside(given);
+                let from = self.value_of(given, 0, Text);
+                let to = if types.len() == 3 { self.value_of(given, 1, Text) } else { self.text("common", span) };
+                let out = self.allocate(Matrix);
+                let found = self.temporary(Int);
+                let outs = std::iter::once(found).chain((0..16).map(|i| VarId(out.base.0 + i))).collect();
+                self.deed(Task::Spaces, vec![from, to], outs, span);
+                self.write_result(given.ids[types.len() - 1], out, Matrix, span);
+                Some(self.back(found, Int, span))
+            }
+            ("sincos", [angle, sin, cos]) if angle == sin && sin == cos && (angle.is_triple() || *angle == Float) => {
+                self.aside(given);
+                let ty = *angle;
+                for (function, target) in [("sin", 1), ("cos", 2)] {
+                    self.run_start = self.body.exprs.len() as u32;
+                    let value = self.fresh(self.of(given.ids[0]));
+                    let id = self.builtin_by_name(function, &[value.id], ty, span);
+                    let var = self.kept(id, ty);
+                    self.write_result(given.ids[target], at(var), ty, span);
+                }
+                self.resume();
+                Some(Typed { ty: Ty::Void, ..self.poison() })
+            }
+            ("split", [Text, Ty::Array(number), rest @ ..])
+                if self.arrays[usize::from(*number)].0 == Text && matches!(rest, [] | [Text] | [Text, Int]) =>
+            {
+                Some(self.split(given, types, span))
+            }
+            ("getattribute", [Text, ..]) => self.attribute(given, types, span),
+            ("spline", [Text, _, ..]) => self.spline(given, types, span),
+            ("texture", [Text, _, _, ..]) => Some(self.texture(given, types, span, wanted)),
+            ("exit", []) if self.stack.is_empty() => {
+                let d = Diagnostic::error("E0109", span, "`exit()` is not supported: use `return`");
+                Some(self.error(d))
+            }
+            _ => None,
+        }
+    }
+
+    /// A task of converted arguments with one result.
+    fn plain(&mut self, task: Task, given: &Given, wants: &[Ty], result: Ty, span: Span) -> Typed {
+        self.aside(given);
+        let mut args = Vec::new();
+        for (i, ty) in wants.iter().enumerate() {
+            self.variables(given, i, *ty, span, &mut args);
+        }
+        self.result(task, args, result, span)
+    }
+
+    /// Puts aside the arguments of a call; those of operators wait like those of calls.
+    pub(super) fn aside(&mut self, given: &Given) {
+        let length = self.pending.len();
+        let missing: Vec<_> = given.ids.iter().copied().filter(|id| !self.pending.contains(id)).collect();
+        self.pending.extend(missing);
+        self.spill();
+        self.pending.truncate(length);
+    }
+
+    /// The variables that hold an argument, part by part.
+    fn variables(&mut self, given: &Given, index: usize, ty: Ty, span: Span, out: &mut Vec<VarId>) {
+        let typed = self.of(given.ids[index]);
+        match typed.place {
+            Some(place) if typed.ty.is_aggregate() => {
+                let mut parts = Vec::new();
+                self.leaves(place, typed.ty, span, &mut parts);
+                for (part, ty) in parts {
+                    self.run_start = self.body.exprs.len() as u32;
+                    let value = self.load(part, ty, span);
+                    let var = self.kept(value.id, ty);
+                    out.push(var);
+                }
+            }
+            _ if typed.ty.is_aggregate() || matches!(typed.ty, Ty::Void | Ty::Closure) => {}
+            _ => out.push(self.value_of(given, index, ty)),
+        }
+    }
+
+    /// An argument as a `ty`, in a variable.
+    fn value_of(&mut self, given: &Given, index: usize, ty: Ty) -> VarId {
+        let id = given.ids[index];
+        let typed = self.of(id);
+        if let Some(var) = typed.temp.filter(|var| self.body.vars[var.index()] == ty) {
+            return var;
+        }
+        self.run_start = self.body.exprs.len() as u32;
+        let value = self.fresh(typed);
+        let value = self.convert(value, ty, self.span_of(id));
+        self.kept(value, ty)
+    }
+
+    fn text(&mut self, text: &str, span: Span) -> VarId {
+        self.run_start = self.body.exprs.len() as u32;
+        let number = self.string(text);
+        let id = self.push(ExprKind::Const([number, 0, 0]), Ty::String, span).id;
+        self.kept(id, Ty::String)
+    }
+
+    fn number(&mut self, value: f32, ty: Ty, span: Span) -> VarId {
+        self.run_start = self.body.exprs.len() as u32;
+        let bits = if ty == Ty::Int { value as i32 as u32 } else { value.to_bits() };
+        let id = self.push(ExprKind::Const([bits; 3]), ty, span).id;
+        self.kept(id, ty)
+    }
+
+    fn deed(&mut self, task: Task, args: Vec<VarId>, outs: Vec<VarId>, span: Span) {
+        self.block.push(Stmt::Do(Box::new(Deed { task, args, outs, span })));
+        self.run_start = self.body.exprs.len() as u32;
+    }
+
+    /// Does it and reads its result.
+    pub(super) fn result(&mut self, task: Task, args: Vec<VarId>, ty: Ty, span: Span) -> Typed {
+        if ty == Ty::Void {
+            self.deed(task, args, Vec::new(), span);
+            self.resume();
+            return Typed { ty, ..self.poison() };
+        }
+        let place = self.allocate(ty);
+        let outs = (0..self.parts(ty) as u32).map(|i| VarId(place.base.0 + i)).collect();
+        self.deed(task, args, outs, span);
+        self.resume();
+        self.load(place, ty, span)
+    }
+
+    fn back(&mut self, var: VarId, ty: Ty, span: Span) -> Typed {
+        self.resume();
+        self.push(ExprKind::Var(var), ty, span)
+    }
+
+    /// Writes what was found to the variable that a call names for it.
+    fn write_result(&mut self, to: ast::ExprId, from: Place, ty: Ty, span: Span) {
+        let Some(target) = self.target(to) else { return };
+        self.run_start = self.body.exprs.len() as u32;
+        match target.ty.is_aggregate() {
+            true => self.copy(target.place, from, ty, span),
+            false => self.copy_back(&target, from.base, ty, span),
+        }
+    }
+
+    fn split(&mut self, given: &Given, types: &[Ty], span: Span) -> Typed {
+        self.aside(given);
+        let Some((_, length)) = self.elements(types[1]) else { return self.poison() };
+        let source = self.value_of(given, 0, Ty::String);
+        let separator = if types.len() > 2 { self.value_of(given, 2, Ty::String) } else { self.text("", span) };
+        let most = match types.len() {
+            4 => self.value_of(given, 3, Ty::Int),
+            _ => self.number(length as f32, Ty::Int, span),
+        };
+        let count = self.temporary(Ty::Int);
+        let pieces = self.allocate(types[1]);
+        let outs = std::iter::once(count).chain((0..length).map(|i| VarId(pieces.base.0 + i))).collect();
+        self.deed(Task::Split, vec![source, separator, most], outs, span);
+        self.write_result(given.ids[1], pieces, types[1], span);
+        self.back(count, Ty::Int, span)
+    }
+
+    /// `getattribute("name", variable)` and `getattribute("object", "name", variable)`.
+    fn attribute(&mut self, given: &Given, types: &[Ty], span: Span) -> Option<Typed> {
+        let (object, name, target) = match types {
+            [Ty::String, _] => (None, 0, 1),
+            [Ty::String, Ty::String, _] => (Some(0), 1, 2),
+            _ => {
+                let d = Diagnostic::error("E0109", span, "`getattribute()` with an index is not supported");
+                return Some(self.error(d));
+            }
+        };
+        let ty = types[target];
+        if ty.is_aggregate() || matches!(ty, Ty::Closure | Ty::Void) {
+            let message = format!("`getattribute()` into {} is not supported", self.words(ty));
+            return Some(self.error(Diagnostic::error("E0109", span, message)));
+        }
+        self.aside(given);
+        let object = match object {
+            Some(index) => self.value_of(given, index, Ty::String),
+            None => self.text("", span),
+        };
+        let name = self.value_of(given, name, Ty::String);
+        let old = self.value_of(given, target, ty);
+        let (found, value) = (self.temporary(Ty::Int), self.temporary(ty));
+        self.deed(Task::Attribute, vec![object, name, old], vec![found, value], span);
+        self.write_result(given.ids[target], at(value), ty, span);
+        Some(self.back(found, Ty::Int, span))
+    }
+
+    /// `spline("basis", x, a, b, c, d, …)` and `spline("basis", x, array)`.
+    fn spline(&mut self, given: &Given, types: &[Ty], span: Span) -> Option<Typed> {
+        if !types[1].is_scalar() {
+            return None;
+        }
+        let result = match types[2..] {
+            [Ty::Array(number)] => self.arrays[usize::from(number)].0,
+            // `spline("basis", x, count, array)`
+            [Ty::Int, Ty::Array(number)] => self.arrays[usize::from(number)].0,
+            [first, .., last] if first == last => first,
+            _ => return None,
+        };
+        if !(result == Ty::Float || result.is_triple()) {
+            return None;
+        }
+        self.aside(given);
+        let mut args = vec![self.value_of(given, 0, Ty::String), self.value_of(given, 1, Ty::Float)];
+        let first = if matches!(types[2..], [Ty::Int, Ty::Array(_)]) { 3 } else { 2 };
+        for i in first..types.len() {
+            self.variables(given, i, result, span, &mut args);
+        }
+        Some(self.result(Task::Spline, args, result, span))
+    }
+
+    /// `texture("file", s, t, …)`; derivatives are not used.
+    fn texture(&mut self, given: &Given, types: &[Ty], span: Span, wanted: Option<Ty>) -> Typed {
+        if !types[1].is_scalar() || !types[2].is_scalar() {
+            let message = "the coordinates of `texture` are floats";
+            return self.error(Diagnostic::error("E0205", span, message));
+        }
+        self.aside(given);
+        let name = self.value_of(given, 0, Ty::String);
+        let (s, t) = (self.value_of(given, 1, Ty::Float), self.value_of(given, 2, Ty::Float));
+        let periodic = self.text("default", span);
+        let channel = self.number(0.0, Ty::Int, span);
+        let smart = self.text("smartcubic", span);
+        let plain = self.text("", span);
+        let (black, clear) = (self.number(0.0, Ty::Color, span), self.number(0.0, Ty::Float, span));
+        let no = self.number(0.0, Ty::Int, span);
+        let mut args = vec![name, s, t, periodic, periodic, channel, smart, plain, black, clear, no];
+        let mut alpha = None;
+        // Four derivatives may stand before the options.
+        let mut next = if types.get(3).is_some_and(|ty| ty.is_scalar()) { 7 } else { 3 };
+        while next < given.ids.len() {
+            let key = self.ast.expr(given.ids[next]).kind;
+            let (ast::ExprKind::String(key), Some(ty)) = (key, types.get(next + 1).copied()) else {
+                let d = Diagnostic::error("E0302", self.span_of(given.ids[next]), "expected an option and its value");
+                self.error(d);
+                break;
+            };
+            let slot = |slots: &[usize], ty| Some((slots.to_vec(), ty));
+            let found = match self.ast.name(key) {
+                "wrap" => slot(&[3, 4], Ty::String),
+                "swrap" => slot(&[3], Ty::String),
+                "twrap" => slot(&[4], Ty::String),
+                "firstchannel" => slot(&[5], Ty::Int),
+                "interp" => slot(&[6], Ty::String),
+                "colorspace" => slot(&[7], Ty::String),
+                "missingcolor" => slot(&[8], Ty::Color),
+                "missingalpha" => slot(&[9], Ty::Float),
+                "alpha" => {
+                    alpha = Some(given.ids[next + 1]);
+                    None
+                }
+                "blur" | "sblur" | "tblur" | "width" | "swidth" | "twidth" | "fill" | "subimage" | "time" | "rwrap"
+                | "errormessage" => None,
+                other => {
+                    let message = format!("`texture` has no option `{other}`");
+                    self.error(Diagnostic::error("E0302", self.span_of(given.ids[next]), message));
+                    None
+                }
+            };
+            if let Some((slots, wants)) = found {
+                if ty.distance(wants).is_none() {
+                    let message = format!("this option is {}, not {}", wants.name(), self.words(ty));
+                    self.error(Diagnostic::error("E0203", self.span_of(given.ids[next + 1]), message));
+                    break;
+                }
+                let var = self.value_of(given, next + 1, wants);
+                slots.iter().for_each(|slot| args[*slot] = var);
+                if slots == [8] {
+                    args[10] = self.number(1.0, Ty::Int, span);
+                }
+            }
+            next += 2;
+        }
+        let (color, opacity) = (self.temporary(Ty::Color), self.temporary(Ty::Float));
+        self.deed(Task::Texture, args, vec![color, opacity], span);
+        if let Some(target) = alpha {
+            self.write_result(target, at(opacity), Ty::Float, span);
+        }
+        let value = self.back(color, Ty::Color, span);
+        match wanted {
+            Some(Ty::Float) => {
+                let first = self.int(0, span);
+                self.op(Op::Component, &[value.id, first.id], Ty::Float, span)
+            }
+            Some(ty) if ty.is_triple() => Typed { ty, ..value },
+            _ => value,
+        }
+    }
+
+    /// Operators of matrices.
+    pub(super) fn matrix_binary(&mut self, op: ast::BinaryOp, given: &Given, span: Span) -> Option<Typed> {
+        use ast::BinaryOp as B;
+        let types = (given.typed[0].ty, given.typed[1].ty);
+        self.aside(given);
+        let inverse = |c: &mut Self, index: usize| {
+            let mut parts = Vec::new();
+            c.variables(given, index, Ty::Matrix, span, &mut parts);
+            let place = c.allocate(Ty::Matrix);
+            let outs: Vec<VarId> = (0..16).map(|i| VarId(place.base.0 + i)).collect();
+            c.deed(Task::Inverse, parts, outs.clone(), span);
+            outs
+        };
+        let found = match (op, types) {
+            (B::Mul | B::Div, (Ty::Matrix, Ty::Matrix)) => {
+                let mut args = Vec::new();
+                self.variables(given, 0, Ty::Matrix, span, &mut args);
+                if op == B::Mul {
+                    self.variables(given, 1, Ty::Matrix, span, &mut args);
+                } else {
+                    args.extend(inverse(self, 1));
+                }
+                self.result(Task::Multiply, args, Ty::Matrix, span)
+            }
+            (B::Mul | B::Div, (Ty::Matrix, ty)) if ty.is_scalar() => {
+                let mut parts = Vec::new();
+                self.variables(given, 0, Ty::Matrix, span, &mut parts);
+                let by = self.value_of(given, 1, Ty::Float);
+                let op = if op == B::Mul { Op::MulF } else { Op::DivF };
+                self.scaled(op, &parts, by, span)
+            }
+            (B::Mul | B::Div, (ty, Ty::Matrix)) if ty.is_scalar() => {
+                let mut parts = Vec::new();
+                if op == B::Mul {
+                    self.variables(given, 1, Ty::Matrix, span, &mut parts);
+                } else {
+                    parts = inverse(self, 1);
+                }
+                let by = self.value_of(given, 0, Ty::Float);
+                self.scaled(Op::MulF, &parts, by, span)
+            }
+            (B::Eq | B::Ne, (Ty::Matrix, Ty::Matrix)) => self.matrices_equal(op == B::Eq, given, span),
+            _ => {
+                self.resume();
+                return None;
+            }
+        };
+        Some(found)
+    }
+
+    fn matrices_equal(&mut self, equal: bool, given: &Given, span: Span) -> Typed {
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        self.variables(given, 0, Ty::Matrix, span, &mut a);
+        self.variables(given, 1, Ty::Matrix, span, &mut b);
+        self.resume();
+        let mut all: Option<ExprId> = None;
+        for (a, b) in a.into_iter().zip(b) {
+            let (a, b) = (self.push(ExprKind::Var(a), Ty::Float, span), self.push(ExprKind::Var(b), Ty::Float, span));
+            let same = self.op(Op::EqF, &[a.id, b.id], Ty::Int, span).id;
+            all = Some(all.map_or(same, |all| self.op(Op::BitAndI, &[all, same], Ty::Int, span).id));
+        }
+        let all = all.unwrap_or(ExprId(0));
+        if equal {
+            Typed { id: all, ty: Ty::Int, place: None, temp: None }
+        } else {
+            self.op(Op::NotI, &[all], Ty::Int, span)
+        }
+    }
+
+    /// Every part with a number.
+    fn scaled(&mut self, op: Op, parts: &[VarId], by: VarId, span: Span) -> Typed {
+        let place = self.allocate(Ty::Matrix);
+        for (i, part) in parts.iter().enumerate() {
+            self.run_start = self.body.exprs.len() as u32;
+            let (a, b) =
+                (self.push(ExprKind::Var(*part), Ty::Float, span), self.push(ExprKind::Var(by), Ty::Float, span));
+            let value = self.op(op, &[a.id, b.id], Ty::Float, span);
+            self.assign(VarId(place.base.0 + i as u32), value.id);
+        }
+        self.resume();
+        self.load(place, Ty::Matrix, span)
+    }
+
+    /// −m
+    pub(super) fn matrix_negated(&mut self, given: &Given, span: Span) -> Typed {
+        self.aside(given);
+        let mut parts = Vec::new();
+        self.variables(given, 0, Ty::Matrix, span, &mut parts);
+        let by = self.number(-1.0, Ty::Float, span);
+        self.scaled(Op::MulF, &parts, by, span)
+    }
+
+    /// `matrix(1)`, `matrix("space", 1)`, `matrix("from", "to")`, sixteen numbers, or those after a space.
+    pub(super) fn construct_matrix(&mut self, given: &Given, span: Span) -> Typed {
+        let types: Vec<Ty> = given.typed.iter().map(|t| t.ty).collect();
+        if let [Ty::Matrix] = types[..] {
+            return given.typed[0];
+        }
+        self.aside(given);
+        let named = usize::from(types.first() == Some(&Ty::String));
+        let place = self.allocate(Ty::Matrix);
+        let outs: Vec<VarId> = (0..16).map(|i| VarId(place.base.0 + i)).collect();
+        match &types[named..] {
+            [Ty::String] if named == 1 => {
+                let (from, to) = (self.value_of(given, 0, Ty::String), self.value_of(given, 1, Ty::String));
+                let found = self.temporary(Ty::Int);
+                self.deed(Task::Spaces, vec![from, to], std::iter::once(found).chain(outs).collect(), span);
+                self.resume();
+                return self.load(place, Ty::Matrix, span);
+            }
+            [one] if one.is_scalar() => {
+                let value = self.value_of(given, named, Ty::Float);
+                self.diagonal(place, value, span);
+            }
+            all if all.len() == 16 && all.iter().all(|ty| ty.is_scalar()) => {
+                for (i, out) in outs.iter().enumerate() {
+                    let value = self.value_of(given, named + i, Ty::Float);
+                    self.run_start = self.body.exprs.len() as u32;
+                    let id = self.push(ExprKind::Var(value), Ty::Float, span).id;
+                    self.assign(*out, id);
+                }
+            }
+            _ => {
+                self.resume();
+                let d = Diagnostic::error("E0205", span, format!("matrix cannot be made from {} values", types.len()));
+                return self.error(d.help("give one number, sixteen, or two names of spaces"));
+            }
+        }
+        if named == 0 {
+            self.resume();
+            return self.load(place, Ty::Matrix, span);
+        }
+        // What is said in a space is brought to the common one.
+        let (from, to) = (self.value_of(given, 0, Ty::String), self.text("common", span));
+        let (found, space) = (self.temporary(Ty::Int), self.allocate(Ty::Matrix));
+        let spaces: Vec<VarId> = (0..16).map(|i| VarId(space.base.0 + i)).collect();
+        self.deed(Task::Spaces, vec![from, to], std::iter::once(found).chain(spaces.iter().copied()).collect(), span);
+        self.result(Task::Multiply, outs.into_iter().chain(spaces).collect(), Ty::Matrix, span)
+    }
+
+    /// `point("space", x, y, z)` and its kin.
+    pub(super) fn in_space(&mut self, given: &Given, ty: Ty, span: Span) -> Typed {
+        self.aside(given);
+        let from = self.value_of(given, 0, Ty::String);
+        let to = self.text("common", span);
+        self.run_start = self.body.exprs.len() as u32;
+        let mut parts = [ExprId(0); 3];
+        for (i, part) in parts.iter_mut().enumerate() {
+            let value = self.fresh(self.of(given.ids[i + 1]));
+            *part = self.convert(value, Ty::Float, span);
+        }
+        let triple = self.op(Op::Triple, &parts, ty, span);
+        let value = self.kept(triple.id, ty);
+        self.result(Task::Between(kind(ty)), vec![from, to, value], ty, span)
+    }
+}
+
+fn at(var: VarId) -> Place {
+    Place { base: var, len: 1, at: At::Known(0) }
+}
+
+fn kind(ty: Ty) -> Kind {
+    match ty {
+        Ty::Point => Kind::Point,
+        Ty::Normal => Kind::Normal,
+        _ => Kind::Vector,
+    }
+}
