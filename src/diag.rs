@@ -4,6 +4,10 @@
 //! a picture of the source with carets ([`Diagnostic::render`]) or as one line ([`Diagnostic::line`]). Rendering never
 //! panics, whatever the spans, and its cost and its output do not grow with the length of a source line.
 
+mod codes;
+
+pub use codes::{CODES, Code};
+
 use crate::span::{Source, Span};
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet, Title};
 use std::ops::Range;
@@ -70,7 +74,7 @@ impl Diagnostic {
     }
 
     fn new(severity: Severity, code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
-        debug_assert!(CODES.iter().any(|(c, _)| *c == code), "{code} is not in the table of codes");
+        debug_assert!(CODES.iter().any(|c| c.code == code), "{code} is not in the table of codes");
         let (note, labels, help) = (String::new(), Vec::new(), Vec::new());
         Diagnostic { severity, code, message: message.into(), span, note, labels, help, origin: None }
     }
@@ -286,49 +290,6 @@ fn clip(text: &str) -> String {
 pub fn render_all(diagnostics: &[Diagnostic], source: &Source, color: bool) -> String {
     diagnostics.iter().map(|d| d.render(source, color)).collect::<Vec<_>>().join("\n")
 }
-
-/// What each code stands for.
-pub const CODES: &[(&str, &str)] = &[
-    ("E0101", "a comment or a string does not end"),
-    ("E0102", "a bracket has no partner"),
-    ("E0103", "an `#include` names an unknown header"),
-    ("E0104", "a preprocessor directive is not supported"),
-    ("E0105", "nested deeper than 256 levels"),
-    ("E0106", "a character that cannot stand in a script"),
-    ("E0107", "the text does not follow the grammar"),
-    ("E0108", "a number does not fit its type"),
-    ("E0109", "a part of the language that is not supported"),
-    ("E0110", "the script is too large"),
-    ("E0111", "a macro cannot be replaced"),
-    ("E0112", "`#include` goes too deep"),
-    ("E0201", "an unknown name"),
-    ("E0202", "a name is declared twice"),
-    ("E0203", "a value has the wrong type"),
-    ("E0204", "an operator does not take these types"),
-    ("E0205", "a function does not take these arguments"),
-    ("E0206", "an unknown function"),
-    ("E0207", "something that cannot be assigned to"),
-    ("E0208", "a component that the value does not have"),
-    ("E0209", "a condition that is no number"),
-    ("E0210", "a function calls itself"),
-    ("E0211", "`break` or `continue` outside a loop"),
-    ("E0212", "the script is too large with its calls written out"),
-    ("E0301", "closures are added and scaled, nothing else"),
-    ("E0302", "an unknown keyword argument of a closure"),
-    ("E0303", "an unknown option"),
-    ("E0304", "a keyword argument is given twice or without a value"),
-    ("E0401", "an unknown parameter"),
-    ("E0402", "a value does not fit a parameter"),
-    ("E0701", "the material gains energy"),
-    ("W0501", "`Ci` is never assigned"),
-    ("W0502", "a statement without effect"),
-    ("W0503", "a parameter lies outside its declared range"),
-    ("W0504", "the top of a layer transmits"),
-    ("W0505", "the preprocessor has something to say"),
-    ("W0506", "a function is not quite what its name says"),
-    ("W0702", "whether the material gains energy could not be decided"),
-    ("W0703", "a weight can be negative"),
-];
 
 #[cfg(test)]
 mod tests {

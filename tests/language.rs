@@ -54,7 +54,7 @@ fn corpus(directory: &str) -> Vec<(PathBuf, String)> {
 #[test]
 fn good_scripts_give_their_trees() {
     let mut failures = Vec::new();
-    for (path, text) in corpus("ok") {
+    for (path, text) in corpus("ok").into_iter().chain(corpus("osl")) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let want = text.lines().find_map(|l| l.strip_prefix("// tree: ")).expect("a `// tree:` line");
         let constant = text.lines().any(|l| l == "// constant");

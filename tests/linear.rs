@@ -33,7 +33,7 @@ fn parsing_takes_a_bounded_number_of_steps_per_byte() {
             within_limit(&format!("surface s(float x = {}{end}) {{ }}", nest("(", ")", n)));
         }
     }
-    for directory in ["ok", "err"] {
+    for directory in ["ok", "osl", "err"] {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(directory);
         for entry in std::fs::read_dir(path).unwrap() {
             within_limit(&std::fs::read_to_string(entry.unwrap().path()).unwrap());

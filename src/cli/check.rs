@@ -115,7 +115,7 @@ fn check(global: &Global, args: &CheckArgs, file: &Path) -> Result<Checked, Fail
         }
         Err(other) => return Err(other),
     };
-    let shader = match global.engine().compile(&name, &text) {
+    let shader = match global.engine_for(file).compile(&name, &text) {
         Ok(shader) => shader,
         Err(e) => return Ok(failed((*e.source).clone(), "", e.diagnostics)),
     };

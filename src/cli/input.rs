@@ -1,5 +1,6 @@
 //! From arguments to materials, directions and values.
 
+use super::host::CliHost;
 use super::{Failure, Global, LayeringArg, TierArg, TintArg};
 use crate::closure::{Bsdf, ClosureTree, LayeringRule, TintRule};
 use crate::diag::Diagnostic;
@@ -8,6 +9,7 @@ use crate::globals::Globals;
 use crate::ir::{ParamDecl, Ty, Value};
 use crate::optics::{Scalar, V3, frame};
 use crate::span::Source;
+use crate::syntax::Directories;
 use std::io::{IsTerminal, Read};
 use std::path::Path;
 
@@ -24,6 +26,12 @@ impl Global {
             TintArg::Channel => TintRule::Channel,
         };
         Engine::new().tier(tier).layering(rule).tint_rule(tint)
+    }
+
+    /// The engine for the script at `path`, with its files and pictures at hand.
+    pub fn engine_for(&self, path: &Path) -> Engine {
+        let host = CliHost::new(path, &self.include, self.quiet);
+        self.engine().includes(Directories(self.include.clone())).host(host)
     }
 
     /// The tier, if one is asked for.
@@ -44,7 +52,8 @@ impl Global {
     /// Compiles the script at `path`, and says what it warns about.
     pub fn shader(&self, path: &Path) -> Result<Shader, Failure> {
         let (name, text) = read(path)?;
-        let shader = self.engine().compile(&name, &text).map_err(|e| Failure::Script(e.render(stderr_has_color())))?;
+        let shader =
+            self.engine_for(path).compile(&name, &text).map_err(|e| Failure::Script(e.render(stderr_has_color())))?;
         self.warn(shader.warnings(), shader.source());
         Ok(shader)
     }

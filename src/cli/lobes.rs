@@ -38,6 +38,43 @@ pub fn run(global: &Global, name: Option<&str>) -> Outcome {
     output::write(&text)
 }
 
+/// Closures that stdosl.h declares itself, with these arguments.
+const STANDARD: &[&str] = &[
+    "background",
+    "debug",
+    "diffuse",
+    "emission",
+    "holdout",
+    "layer",
+    "microfacet",
+    "oren_nayar",
+    "phong",
+    "reflection",
+    "refraction",
+    "sheen_bsdf",
+    "subsurface",
+    "translucent",
+    "transparent",
+    "ward",
+];
+
+/// The header for other compilers, made from the registry.
+pub fn header() -> Outcome {
+    let mut text = String::from(
+        "// The closures that stdosl.h lacks. Made by `overcoat lobes --header`; do not edit.\n\n\
+         #ifndef OVERCOAT_H\n#define OVERCOAT_H\n\n\
+         #ifndef BUILTIN\n#define BUILTIN [[ int builtin = 1 ]]\n#endif\n\n",
+    );
+    for form in forms().filter(|f| !STANDARD.contains(&f.name)) {
+        let first = paragraph(form.doc);
+        let _ = writeln!(text, "// {}", first.split_inclusive(". ").next().unwrap_or("").trim());
+        let params: Vec<String> = form.positional().map(|p| format!("{} {}", p.ty.name(), p.name)).collect();
+        let _ = writeln!(text, "closure color {}({}) BUILTIN;", form.name, params.join(", "));
+    }
+    text.push_str("\n#endif\n");
+    output::write(&text)
+}
+
 fn describe(form: &Form) -> Value {
     let params: Vec<Value> = form
         .params

@@ -6,7 +6,9 @@ mod audit;
 mod check;
 mod cost;
 mod eval;
+mod explain;
 mod furnace;
+mod host;
 mod input;
 mod lobes;
 mod output;
@@ -45,6 +47,9 @@ struct Global {
     /// Which channels of a top's albedo a layer answers to.
     #[arg(long, global = true, value_enum, default_value = "largest")]
     tint_rule: TintArg,
+    /// Look here for what scripts `#include` and for textures. Repeatable; the script's own directory comes first.
+    #[arg(short = 'I', long = "include", global = true, value_name = "DIR")]
+    include: Vec<PathBuf>,
     /// Write one JSON document to stdout.
     #[arg(long, global = true)]
     json: bool,
@@ -84,7 +89,7 @@ enum Command {
     Tree {
         /// The script; `-` reads stdin.
         file: PathBuf,
-        /// Also tell how each lobe below a layer is scaled, and why.
+        /// Also tell how each lobe below a layer is scaled, and what specialising removed, and why.
         #[arg(long)]
         explain: bool,
     },
@@ -124,6 +129,11 @@ enum Command {
         /// The script; `-` reads stdin.
         file: PathBuf,
     },
+    /// Say more about the code of a message, such as E0203; without one, list all.
+    Explain {
+        /// The code.
+        code: Option<String>,
+    },
     /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
     Furnace(furnace::FurnaceArgs),
     /// Does the material scatter alike when light and viewer change places?
@@ -132,6 +142,9 @@ enum Command {
     Lobes {
         /// Only those of this name.
         name: Option<String>,
+        /// Write the header that declares to other compilers what their own header lacks.
+        #[arg(long, conflicts_with = "name")]
+        header: bool,
     },
     /// Make a picture of the material.
     Render(render::RenderArgs),
@@ -172,9 +185,11 @@ pub fn main() -> ExitCode {
         Command::Audit(args) => audit::run(&cli.global, args),
         Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
+        Command::Explain { code } => explain::run(&cli.global, code.as_deref()),
         Command::Furnace(args) => furnace::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
-        Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
+        Command::Lobes { header: true, .. } => lobes::header(),
+        Command::Lobes { name, .. } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
     };

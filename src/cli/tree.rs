@@ -27,6 +27,7 @@ pub fn run(global: &Global, file: &Path, explain: bool) -> Outcome {
         let mut document = json!({ "shader": material.name(), "closure": node(&tree, tree.root()) });
         if explain {
             document["layering"] = layering(&material);
+            document["removed"] = json!(material.program().removed());
         }
         return output::json(&document);
     }
@@ -34,6 +35,9 @@ pub fn run(global: &Global, file: &Path, explain: bool) -> Outcome {
     outline(&tree, &mut text);
     if explain {
         layering_text(&layering(&material), &mut text);
+        for line in material.program().removed() {
+            let _ = writeln!(text, "{line}");
+        }
     }
     output::write(&text)
 }

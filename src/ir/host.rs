@@ -37,8 +37,45 @@ pub struct Lookup<'a> {
     pub colorspace: &'a str,
 }
 
+/// What scripts ask about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Subject {
+    /// `transform("world", …)`, `matrix("object", 1)`
+    Spaces,
+    /// `getattribute`, `raytype`, `isconnected`
+    Attributes,
+    /// `texture`
+    Textures,
+    /// `printf`, `warning`, `error`
+    Speech,
+}
+
+/// What the host at hand, if any, answers at all.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Answers(u8);
+
+impl Answers {
+    /// Of a host.
+    pub fn of(host: Option<&dyn Host>) -> Answers {
+        let all = [Subject::Spaces, Subject::Attributes, Subject::Textures, Subject::Speech];
+        let known = |subject: &Subject| host.is_some_and(|host| host.answers(*subject));
+        Answers(all.iter().filter(|s| known(s)).map(|s| 1 << *s as u8).sum())
+    }
+
+    /// Whether anything is answered about a subject.
+    pub fn on(self, subject: Subject) -> bool {
+        self.0 & 1 << subject as u8 != 0
+    }
+}
+
 /// Answers to the questions of scripts; every one has a plain answer by default. Called from any thread.
 pub trait Host: Send + Sync {
+    /// Whether it says anything about a subject. What it says nothing about is settled before shading.
+    fn answers(&self, subject: Subject) -> bool {
+        let _ = subject;
+        true
+    }
+
     /// The matrix from `space` to the space that `P` and `N` are in, rows first, points as rows on its left. `None`: no
     /// such space. By default every space is the same.
     fn matrix(&self, space: &str, globals: &Globals) -> Option<[f32; 16]> {

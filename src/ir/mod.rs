@@ -19,7 +19,8 @@ pub(crate) mod tasks;
 mod types;
 
 pub use body::GlobalVar;
-pub use host::{Host, Lookup, Speech};
+pub(crate) use host::Answers;
+pub use host::{Host, Lookup, Speech, Subject};
 pub use program::{Program, ShadeError, Site};
 pub use shader::{CheckedShader, ParamDecl, Value};
 pub use types::Ty;

@@ -2,7 +2,7 @@
 
 use super::body::{Body, Cells, ExprKind, VarId};
 use super::check::suggest;
-use super::host::Host;
+use super::host::{Answers, Host};
 use super::lower;
 use super::passes::{dead, fold, layers, needs};
 use super::program::Program;
@@ -177,9 +177,9 @@ impl CheckedShader {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let hosted = self.host.is_some();
-        let body = dead::remove(fold::fold(&body, &known, hosted));
-        let needs = needs::needs(&body, hosted);
+        let answers = Answers::of(self.host.as_deref());
+        let body = dead::remove(fold::fold(&body, &known, answers));
+        let needs = needs::needs(&body, answers);
         if !needs.errors.is_empty() {
             return Err(needs.errors);
         }
@@ -203,9 +203,9 @@ impl CheckedShader {
     /// specialising saves is the difference to it.
     pub fn unspecialised(&self) -> Program {
         let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
-        let hosted = self.host.is_some();
-        let body = dead::remove(fold::fold_open(&self.body, &open, hosted));
-        let program = lower::lower(&body, &needs::needs(&body, hosted), &layers::layers(&body), Vec::new());
+        let answers = Answers::of(self.host.as_deref());
+        let body = dead::remove(fold::fold_open(&self.body, &open, answers));
+        let program = lower::lower(&body, &needs::needs(&body, answers), &layers::layers(&body), Vec::new());
         Program { host: self.host.clone(), iterations: self.iterations, ..program }
     }
 
@@ -231,15 +231,15 @@ impl CheckedShader {
             .map(|(_, name)| format!("`{name}` is never made: its weight is zero or its branch is not taken"))
             .collect();
         found.dedup();
-        for param in &self.params {
-            if param.ty != Ty::Closure && !param.output {
-                let how = if set.iter().any(|(name, _)| *name == param.name) { "as set" } else { "at its default" };
-                found.push(format!("the parameter `{}` is a constant, {how}", param.name));
-            }
+        let fixed = set.iter().map(|(name, _)| format!("`{name}`")).collect::<BTreeSet<_>>();
+        if !fixed.is_empty() {
+            let names = fixed.into_iter().collect::<Vec<_>>().join(", ");
+            found.push(format!("folded into the program as they are set: {names}"));
         }
-        if self.body.exprs.len() > needs.used.iter().filter(|u| **u).count() {
-            let live = needs.used.iter().filter(|used| **used).count();
-            found.push(format!("{live} expressions are left of {}", self.body.exprs.len()));
+        let live = needs.used.iter().filter(|used| **used).count();
+        if live < self.body.exprs.len() {
+            let of = self.body.exprs.len();
+            found.push(format!("{live} of {of} expressions are left: what is constant is worked out before shading"));
         }
         found
     }

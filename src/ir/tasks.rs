@@ -5,7 +5,7 @@
 use super::body::Cells;
 use super::functions::matrix::{self, Kind, Matrix};
 use super::functions::text;
-use super::host::{Host, Lookup, Speech};
+use super::host::{Answers, Host, Lookup, Speech, Subject};
 use super::types::Ty;
 use crate::globals::Globals;
 
@@ -112,10 +112,20 @@ pub struct Surroundings<'a, 's> {
 const MAX_STRING: usize = 1 << 16;
 
 impl Task {
-    /// Whether the result depends on the host, if there is one.
-    pub fn asks_host(self) -> bool {
-        use Task::{Attribute, Between, IsConnected, RayType, Say, Spaces, Texture};
-        matches!(self, Attribute | Between(_) | IsConnected | RayType | Say(_) | Spaces | Texture)
+    /// What it asks the host about, if anything.
+    fn subject(self) -> Option<Subject> {
+        match self {
+            Task::Between(_) | Task::Spaces => Some(Subject::Spaces),
+            Task::Attribute | Task::RayType | Task::IsConnected => Some(Subject::Attributes),
+            Task::Texture => Some(Subject::Textures),
+            Task::Say(_) => Some(Subject::Speech),
+            _ => None,
+        }
+    }
+
+    /// Whether the result depends on a host that answers so.
+    pub fn asks(self, answers: Answers) -> bool {
+        self.subject().is_some_and(|subject| answers.on(subject))
     }
 
     /// Whether it does something that its results do not show.

@@ -28,6 +28,7 @@ pub use witness::Witness;
 
 use crate::diag::Diagnostic;
 use crate::engine::Shader;
+use crate::ir::Answers;
 use crate::ir::Value;
 use domain::{Case, domain};
 use energy::{Detail, Energy};
@@ -69,7 +70,8 @@ pub fn prove(shader: &Shader, options: &Options) -> Result<Report, Vec<Diagnosti
     body.strings = domain.strings.clone();
     let effort = FINE_EFFORT / domain.cases.len().clamp(1, 30);
     for case in &domain.cases {
-        let Some((graph, root)) = trace::trace(&body, checked.host.is_some(), case.bindings.clone(), &domain.globals)
+        let Some((graph, root)) =
+            trace::trace(&body, Answers::of(checked.host.as_deref()), case.bindings.clone(), &domain.globals)
         else {
             report.too_large(shader);
             break;

@@ -8,6 +8,7 @@ use super::{Options, Report, Verdict};
 use crate::audit::{Side, Tolerance, albedo};
 use crate::closure::Bsdf;
 use crate::engine::Shader;
+use crate::ir::Answers;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -28,7 +29,9 @@ pub fn probe(shader: &Shader, options: &Options, report: &Report, count: usize, 
     }
     for round in 0..count.div_ceil(DIRECTIONS) {
         let case = &domain.cases[rng.random_range(0..domain.cases.len())];
-        let Some((graph, root)) = trace(&body, checked.host.is_some(), case.bindings.clone(), &domain.globals) else {
+        let Some((graph, root)) =
+            trace(&body, Answers::of(checked.host.as_deref()), case.bindings.clone(), &domain.globals)
+        else {
             return found;
         };
         let problem = Problem::new(&graph, root, Energy::new(&graph, root, shader.engine().layering_of()));

@@ -7,6 +7,7 @@ mod statements;
 
 use super::graph::{Cid, Closure, Graph, Id, LeafKind, Node, Order};
 use super::interval::Interval;
+use crate::ir::Answers;
 use crate::ir::Ty;
 use crate::ir::body::{Args, Body, Cells, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId};
 use crate::ir::builtins::BUILTINS;
@@ -37,10 +38,10 @@ pub const ENDLESS: f64 = 1e9;
 const MAX_STEPS: usize = 2_000_000;
 
 /// Traces a body. `bindings` by variable; `ranges` limits globals. `None`: too large.
-/// `hosted`: what scripts ask may be answered in any way.
+/// `answers`: about what a host may say anything.
 pub fn trace(
     body: &Body,
-    hosted: bool,
+    answers: Answers,
     bindings: HashMap<VarId, Binding>,
     ranges: &[(GlobalVar, Interval)],
 ) -> Option<(Graph, Cid)> {
@@ -48,7 +49,7 @@ pub fn trace(
     let zero = graph.push(Node::Int(0));
     let cells = |ty: &Ty| if *ty == Ty::Closure { Held::Closure(Cid(0)) } else { Held::Cells([zero; 3]) };
     let env = body.vars.iter().map(cells).collect();
-    let mut tracer = Tracer { body, hosted, graph, bindings, ranges, env, steps: 0, opaque: 0 };
+    let mut tracer = Tracer { body, answers, graph, bindings, ranges, env, steps: 0, opaque: 0 };
     tracer.block(&body.stmts)?;
     let root = match tracer.env[VarId::CI.index()] {
         Held::Closure(root) => root,
@@ -59,7 +60,7 @@ pub fn trace(
 
 struct Tracer<'a> {
     body: &'a Body,
-    hosted: bool,
+    answers: Answers,
     graph: Graph,
     bindings: HashMap<VarId, Binding>,
     ranges: &'a [(GlobalVar, Interval)],

@@ -21,6 +21,10 @@ pub(super) struct Target {
 impl Checker<'_> {
     /// Makes what a target names stay what it is while the value is worked out.
     pub(super) fn pin_target(&mut self, id: ast::ExprId, value: Option<u32>) {
+        if self.depth == 0 {
+            // Defaults assign nothing; the assignment says so.
+            return;
+        }
         let Some(target) = self.target(id) else { return };
         let wanted = if target.component.is_some() { Ty::Float } else { target.ty };
         if let Some(value) = value {

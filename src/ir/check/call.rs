@@ -1,6 +1,6 @@
 //! Checking of calls: functions of the script, of the table, and closures.
 
-use super::super::body::{ExprId, ExprKind, Op};
+use super::super::body::{ExprId, ExprKind, GlobalVar, Op};
 use super::super::builtins::{self, BUILTINS, Eval};
 use super::super::types::Ty;
 use super::{Checker, Typed, suggest};
@@ -48,6 +48,15 @@ impl<'a> Checker<'a> {
                 return self.inline(index, &types, &given, span);
             }
         }
+        if let ("faceforward", [a, b]) = (text, &given.typed[..])
+            && a.ty.is_spatial()
+            && b.ty.is_spatial()
+        {
+            let (a, b) = (a.id, b.id);
+            let ng = self.push(ExprKind::Global(GlobalVar::Ng), Ty::Vector, span);
+            let id = self.builtin_by_name(text, &[a, b, ng.id], Ty::Vector, span);
+            return Typed { id, ty: Ty::Vector, place: None, temp: None };
+        }
         if let Some(done) = self.task(text, &given, span, wanted) {
             return done;
         }
@@ -87,7 +96,7 @@ impl<'a> Checker<'a> {
     pub(super) fn builtin_by_name(&mut self, name: &str, args: &[ExprId], ty: Ty, span: Span) -> ExprId {
         let fits = |index: &&u16| {
             let types: Vec<Ty> = args.iter().map(|id| self.body.expr(*id).ty).collect();
-            BUILTINS[**index as usize].instances().any(|(result, params)| result == ty && params == types)
+            BUILTINS[**index as usize].instances().any(|(result, params)| result == ty && alike(&params, &types))
         };
         match builtins::overloads(name).iter().find(fits) {
             Some(index) => {
@@ -214,4 +223,10 @@ impl<'a> Checker<'a> {
         let like = suggest(name, names).map(|like| format!("did you mean `{like}`?"));
         self.error(like.into_iter().fold(d, Diagnostic::help))
     }
+}
+
+/// Whether values of the one types stand for the others as they are.
+fn alike(params: &[Ty], types: &[Ty]) -> bool {
+    let fits = |(a, b): (&Ty, &Ty)| b.distance(*a).is_some_and(|d| d <= 1);
+    params.len() == types.len() && params.iter().zip(types).all(fits)
 }

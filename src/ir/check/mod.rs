@@ -116,6 +116,8 @@ struct Checker<'a> {
     stack: Vec<u32>,
     calls: usize,
     over_budget: bool,
+    /// Nothing uses the value of the run to come.
+    discards: bool,
     depth: usize,
     chain: usize,
     /// Statements of the block at hand.
@@ -152,6 +154,7 @@ impl<'a> Checker<'a> {
             stack: Vec::new(),
             calls: 0,
             over_budget: false,
+            discards: false,
             depth: 0,
             chain: 0,
             block: Vec::new(),

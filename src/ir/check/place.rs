@@ -47,15 +47,15 @@ impl Checker<'_> {
                 let ty = self.array_type(*ty, declarator.length, None, declarator.span);
                 fields.push((declarator.name, ty));
             }
-            let number = self.layouts.len() as u16;
-            if let Some(earlier) = self.struct_names.insert(declared.name, number) {
-                let name = ast.name(declared.name);
-                let same = self.layouts[usize::from(earlier)].fields.len() == fields.len();
-                if !same {
-                    let d = Diagnostic::error("E0202", declared.span, format!("the struct `{name}` is declared twice"));
-                    self.diagnostics.push(d);
+            if let Some(earlier) = self.struct_names.get(&declared.name) {
+                // The same header twice is fine.
+                if self.layouts[usize::from(*earlier)].fields != fields {
+                    let message = format!("the struct `{}` is declared twice", ast.name(declared.name));
+                    self.diagnostics.push(Diagnostic::error("E0202", declared.span, message));
                 }
+                continue;
             }
+            self.struct_names.insert(declared.name, self.layouts.len() as u16);
             self.layouts.push(Layout { name: declared.name, fields });
         }
     }

@@ -39,6 +39,7 @@ impl Checker<'_> {
     /// The same where the place asks for a type.
     pub(super) fn run_for(&mut self, run: ast::Root, wanted: Option<Ty>) -> Typed {
         let outer = std::mem::take(&mut self.pending);
+        let discarded = std::mem::take(&mut self.discards);
         self.run_start = self.body.exprs.len() as u32;
         if let Some(ty) = wanted {
             self.hints.insert(run.root.0, ty);
@@ -51,7 +52,8 @@ impl Checker<'_> {
             }
             let id = ast::ExprId(id);
             let lazy = plan.lazy.binary_search(&id.0).is_ok();
-            let typed = if lazy { self.end_branch(id, &mut open) } else { self.expression(id, id == run.root) };
+            let typed =
+                if lazy { self.end_branch(id, &mut open) } else { self.expression(id, discarded && id == run.root) };
             self.typed[id.0 as usize] = typed;
             if !lazy {
                 let operands = self.operand_count(id);

@@ -117,6 +117,7 @@ impl Checker<'_> {
     }
 
     fn action(&mut self, root: ast::Root) {
+        self.discards = true;
         let typed = self.run(root);
         let ast::Expr { kind, span } = *self.ast.expr(root.root);
         let acts = match kind {

@@ -317,7 +317,8 @@ impl Checker<'_> {
             [Ty::Array(number)] => self.arrays[usize::from(number)].0,
             // `spline("basis", x, count, array)`
             [Ty::Int, Ty::Array(number)] => self.arrays[usize::from(number)].0,
-            [first, .., last] if first == last => first,
+            [..] if types.len() >= 6 && types[2..].iter().all(|ty| ty.is_scalar()) => Ty::Float,
+            [first, _, .., last] if types.len() >= 6 && first == last => first,
             _ => return None,
         };
         if !(result == Ty::Float || result.is_triple()) {

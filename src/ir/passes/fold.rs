@@ -9,6 +9,7 @@ use super::super::body::{
     Args, Body, Cells, Deed, Expr, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId, each_written,
 };
 use super::super::builtins::{BUILTINS, MAX_ARGS};
+use super::super::host::Answers;
 use super::super::ops;
 use super::super::tasks::{Strings, Surroundings, Task};
 use super::super::types::Ty;
@@ -16,20 +17,20 @@ use super::env::Env;
 use crate::globals::Globals;
 use crate::span::Span;
 
-/// Folds a body. `known` holds, by variable, the values of parameters that are set; `hosted`: someone will be there to
-/// answer questions.
-pub fn fold(body: &Body, known: &[Option<Cells>], hosted: bool) -> Body {
+/// Folds a body. `known` holds, by variable, the values of parameters that are set; `answers`: what a host will
+/// answer while shading.
+pub fn fold(body: &Body, known: &[Option<Cells>], answers: Answers) -> Body {
     let mut folder = Folder::new(body, known);
-    folder.hosted = hosted;
+    folder.answers = answers;
     let stmts = folder.block(&body.stmts);
     folder.new.stmts = stmts;
     folder.new
 }
 
 /// Folds a body without using the initial values of the variables in `open`: what is left reads them at every point.
-pub fn fold_open(body: &Body, open: &[VarId], hosted: bool) -> Body {
+pub fn fold_open(body: &Body, open: &[VarId], answers: Answers) -> Body {
     let mut folder = Folder::new(body, &[]);
-    folder.hosted = hosted;
+    folder.answers = answers;
     folder.open = open.to_vec();
     let stmts = folder.block(&body.stmts);
     folder.new.stmts = stmts;
@@ -73,7 +74,7 @@ struct Folder<'a> {
     /// Parameters whose initial value is not to be used.
     open: Vec<VarId>,
     env: Env<Option<Known>>,
-    hosted: bool,
+    answers: Answers,
     /// Expressions that may still be looked at for the sake of unrolling.
     unrolling: usize,
     /// The new expression of each old one of the run at hand, from `origin` on.
@@ -92,7 +93,7 @@ impl<'a> Folder<'a> {
             fixed: fixed.to_vec(),
             open: Vec::new(),
             env,
-            hosted: false,
+            answers: Answers::default(),
             unrolling: MAX_UNROLLING,
             map: Vec::new(),
             origin: 0,
@@ -168,10 +169,10 @@ impl<'a> Folder<'a> {
     }
 
     fn deed(&mut self, deed: &Deed, out: &mut Vec<Stmt>) {
-        if deed.task.is_heard() && !self.hosted {
+        if deed.task.is_heard() && !deed.task.asks(self.answers) {
             return;
         }
-        let asked = deed.task.asks_host() && self.hosted;
+        let asked = deed.task.asks(self.answers);
         if let (Task::Between(_), false) = (deed.task, asked) {
             // Without a host every space is the same.
             let known = self.env.get(deed.args[2]);

@@ -2,6 +2,7 @@
 
 use super::super::body::{Body, ExprId, ExprKind, GlobalVar, Root, Stmt};
 use super::super::check::suggest;
+use super::super::host::Answers;
 use super::each_used;
 use crate::diag::Diagnostic;
 use crate::lobes::registry::ParamTy;
@@ -15,7 +16,9 @@ pub struct Needs {
     pub globals: BTreeSet<GlobalVar>,
     /// Whether a global is read for more than the frame of a lobe.
     pub varying: bool,
-    /// Whether live code asks the host anything.
+    /// What the host answers.
+    pub answers: Answers,
+    /// Whether live code asks it anything.
     pub asks: bool,
     /// Which expressions live code uses, by index.
     pub used: Vec<bool>,
@@ -24,14 +27,14 @@ pub struct Needs {
 }
 
 /// Looks through live code.
-pub fn needs(body: &Body, hosted: bool) -> Needs {
-    let mut needs = Needs { used: vec![false; body.exprs.len()], ..Needs::default() };
+pub fn needs(body: &Body, answers: Answers) -> Needs {
+    let mut needs = Needs { used: vec![false; body.exprs.len()], answers, ..Needs::default() };
     // Uses of each expression other than as the normal or tangent of a lobe.
     let mut valued = vec![false; body.exprs.len()];
     let mut scratch = Vec::new();
     look(body, &body.stmts, &mut needs, &mut valued, &mut scratch);
     // What a host answers may differ from point to point.
-    needs.varying |= needs.asks && hosted;
+    needs.varying |= needs.asks;
     needs
 }
 
@@ -40,7 +43,7 @@ fn look(body: &Body, stmts: &[Stmt], needs: &mut Needs, valued: &mut [bool], scr
         match stmt {
             Stmt::Assign(_, root) => run(body, *root, needs, valued, scratch),
             Stmt::Store { .. } => {}
-            Stmt::Do(deed) => needs.asks |= deed.task.asks_host(),
+            Stmt::Do(deed) => needs.asks |= deed.task.asks(needs.answers),
             Stmt::Loop { before, condition, body: inner, .. } => {
                 look(body, before, needs, valued, scratch);
                 run(body, *condition, needs, valued, scratch);

@@ -84,7 +84,7 @@ impl Tracer<'_> {
 
     /// What a task leaves, if all it is given is known; else anything.
     pub(super) fn deed(&mut self, deed: &Deed) {
-        let asked = self.hosted && deed.task.asks_host();
+        let asked = deed.task.asks(self.answers);
         let cells = |held: Held| match held {
             Held::Cells(ids) => ids,
             Held::Closure(_) => [Id(0); 3],

@@ -1,0 +1,29 @@
+// The closures that stdosl.h lacks. Made by `overcoat lobes --header`; do not edit.
+
+#ifndef OVERCOAT_H
+#define OVERCOAT_H
+
+#ifndef BUILTIN
+#define BUILTIN [[ int builtin = 1 ]]
+#endif
+
+// Woven cloth whose threads run along T: a highlight in a cone about them.
+closure color fabric(normal N, vector T, float roughness) BUILTIN;
+// Dielectric threads lying along T: a streak of surface reflection and colored light from inside.
+closure color thread(normal N, vector T, color A, float eta, float kd, float gamma_s, float gamma_v) BUILTIN;
+// Woven cloth of two families of dielectric threads, one along T, one across it.
+closure color microcylinder(normal N, vector T, string preset) BUILTIN;
+// Woven cloth of two families of dielectric threads, one along T, one across it, parameter by parameter.
+closure color microcylinder_threads(normal N, vector T, color A1, float eta1, float kd1, float gamma_s1, float gamma_v1, float a1, float offset1, color A2, float eta2, float kd2, float gamma_s2, float gamma_v2, float a2, float offset2) BUILTIN;
+// Velvet after Ashikhmin: an even body with a rim toward grazing angles.
+closure color velvet(normal N, float roughness) BUILTIN;
+// Rough diffuse reflection that loses no energy: what bounces between the facets is added back.
+closure color eon(normal N, color albedo, float roughness) BUILTIN;
+// Woven cloth of two families of dielectric threads, one along T, one across it, parameter by parameter.
+closure color microcylinder(normal N, vector T, color A1, float eta1, float kd1, float gamma_s1, float gamma_v1, float a1, float offset1, color A2, float eta2, float kd2, float gamma_s2, float gamma_v2, float a2, float offset2) BUILTIN;
+// Sheen layered over a closure: `layer(tint * sheen_bsdf(N, 1, roughness), base)`.
+closure color sheen(closure color base, normal N, color tint, float roughness) BUILTIN;
+// The bare sheen lobe: `sheen_bsdf(N, 1, roughness)`.
+closure color sheen(normal N, float roughness) BUILTIN;
+
+#endif
