@@ -104,6 +104,8 @@ pub enum LeafKind {
     Global(GlobalVar, usize),
     /// dot(N, I).
     Facing,
+    /// A channel of a lookup of a picture, by its number.
+    Picture(u32),
 }
 
 /// A value that is free within its range.

@@ -147,6 +147,7 @@ impl Report {
             LeafKind::Param(p, _) => shader.params()[p].name.clone(),
             LeafKind::Global(g, _) => g.name().to_owned(),
             LeafKind::Facing => "dot(N, I)".to_owned(),
+            LeafKind::Picture(_) => "texture()".to_owned(),
         }
     }
 

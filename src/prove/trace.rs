@@ -115,9 +115,13 @@ impl Tracer<'_> {
             return None;
         }
         let before = self.env.clone();
+        let assumed = self.assume(condition, true);
         self.block(then)?;
+        self.unassume(assumed);
         let after = std::mem::replace(&mut self.env, before);
+        let assumed = self.assume(condition, false);
         self.block(other)?;
+        self.unassume(assumed);
         for (var, then) in after.into_iter().enumerate() {
             let other = self.env[var];
             if then != other {

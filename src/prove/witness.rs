@@ -228,6 +228,8 @@ impl<'p, 'g> Hunt<'p, 'g> {
                     *x = numbers.get(k).map_or(*x, |n| *n as f64);
                 }
                 LeafKind::Param(..) => *x = *x as f32 as f64,
+                // Measuring sees the picture there is.
+                LeafKind::Picture(_) => {}
             }
         }
         point

@@ -1,6 +1,7 @@
 //! Loops, arrays and tasks in the trace.
 
-use super::super::graph::{Id, Node, Order};
+use super::super::graph::{Id, LeafKind, Node, Order};
+use super::super::interval::Interval;
 use super::{Held, MAX_STEPS, Tracer};
 use crate::ir::Ty;
 use crate::ir::body::{Cells, Deed, Root, Stmt, VarId};
@@ -26,8 +27,10 @@ impl Tracer<'_> {
                         return None;
                     }
                     let out = self.env.clone();
+                    let assumed = self.assume(holds, true);
                     self.block(body)?;
                     self.rounds(before, condition, body, left - 1)?;
+                    self.unassume(assumed);
                     for (var, other) in out.into_iter().enumerate() {
                         let then = self.env[var];
                         if then != other {
@@ -36,6 +39,51 @@ impl Tracer<'_> {
                     }
                     return Some(());
                 }
+            }
+        }
+    }
+
+    /// Goes on as if a condition held, or did not: choices that it settles are taken. What variables held before and hold
+    /// now goes to [`Tracer::unassume`].
+    pub(super) fn assume(&mut self, condition: Id, holds: bool) -> Vec<(usize, Held, Held)> {
+        let mut settled = Vec::new();
+        let mut waiting = vec![(condition, holds)];
+        while let Some((id, holds)) = waiting.pop() {
+            settled.push((id, holds));
+            let other = |id: Id| self.graph.value(id).is_some_and(|x| (x != 0.0) != holds);
+            match self.graph.node(id) {
+                Node::Not(a) => waiting.push((a, !holds)),
+                Node::Truth(a) => waiting.push((a, holds)),
+                Node::And(a, b) if holds => waiting.extend([(a, true), (b, true)]),
+                Node::Or(a, b) if !holds => waiting.extend([(a, false), (b, false)]),
+                Node::Select(c, a, b) if other(b) => waiting.extend([(c, true), (a, holds)]),
+                Node::Select(c, a, b) if other(a) => waiting.extend([(c, false), (b, holds)]),
+                _ => {}
+            }
+        }
+        let mut changed = Vec::new();
+        for (var, held) in self.env.iter_mut().enumerate() {
+            let before = *held;
+            let Held::Cells(ids) = held else { continue };
+            for id in ids {
+                while let Node::Select(c, a, b) = self.graph.node(*id)
+                    && let Some((_, holds)) = settled.iter().find(|(s, _)| *s == c)
+                {
+                    *id = if *holds { a } else { b };
+                }
+            }
+            if *held != before {
+                changed.push((var, before, *held));
+            }
+        }
+        changed
+    }
+
+    /// Gives variables that still hold what was assumed what they held before.
+    pub(super) fn unassume(&mut self, assumed: Vec<(usize, Held, Held)>) {
+        for (var, before, after) in assumed {
+            if self.env[var] == after {
+                self.env[var] = before;
             }
         }
     }
@@ -120,11 +168,14 @@ impl Tracer<'_> {
             }
         }
         for var in &deed.outs {
-            let mut ids = [self.opaque(), self.opaque(), self.opaque()];
-            if deed.task == Task::Texture {
+            let ids = match deed.task {
                 // Pictures hold what reflects: 0 to 1.
-                ids = ids.map(|id| self.fraction(id));
-            }
+                Task::Texture => std::array::from_fn(|_| {
+                    self.opaque += 1;
+                    self.graph.leaf(LeafKind::Picture(self.opaque), Interval::new(0.0, 1.0), false)
+                }),
+                _ => [self.opaque(), self.opaque(), self.opaque()],
+            };
             self.env[var.index()] = Held::Cells(ids);
         }
     }

@@ -1,0 +1,99 @@
+//! What the language costs: compiling a script, and running it at a point.
+
+use divan::{Bencher, black_box};
+use overcoat::{Engine, Globals, Material};
+
+const VELVET: &str = include_str!("../examples/velvet.osl");
+
+/// Four octaves of Perlin noise in a loop; a branch drives color and roughness.
+const NOISE: &str = "
+float fbm(point p)
+{
+    float sum = 0, amplitude = 0.5;
+    point q = p;
+    for (int i = 0; i < 4; i++) {
+        sum += amplitude * noise(q);
+        q *= 2;
+        amplitude *= 0.5;
+    }
+    return sum;
+}
+surface rough(color a = color(0.8, 0.2, 0.1), color b = color(0.1, 0.2, 0.8))
+{
+    float f = fbm(P * 8);
+    color c = b;
+    float r = 0.6;
+    if (f > 0.5) {
+        c = a;
+        r = 0.3 + 0.2 * f;
+    }
+    Ci = c * oren_nayar(N, r);
+}";
+
+/// A material of about 500 lines: 100 functions of five lines, all of them called.
+fn long() -> String {
+    let mut text = String::new();
+    for i in 0..100 {
+        text += &format!(
+            "float part{i}(float x, float y)\n{{\n    float a = sin(x * {i}.5) + y;\n    return clamp(a, 0, 1);\n}}\n"
+        );
+    }
+    text += "surface long(float k = 0.5) {\n    float sum = 0;\n";
+    for i in 0..100 {
+        text += &format!("    sum += part{i}(u + k, v) * 0.01;\n");
+    }
+    text + "    Ci = sum * diffuse(N);\n}\n"
+}
+
+fn material(text: &str) -> Material {
+    let shader = Engine::new().compile("bench", text).expect("compiles");
+    shader.material(&[]).expect("specialises")
+}
+
+#[divan::bench]
+fn compile_velvet(bencher: Bencher) {
+    bencher.bench(|| Engine::new().compile("velvet", black_box(VELVET)));
+}
+
+#[divan::bench]
+fn compile_500_lines(bencher: Bencher) {
+    let text = long();
+    bencher.bench(|| Engine::new().compile("long", black_box(&text)));
+}
+
+#[divan::bench]
+fn specialise_500_lines(bencher: Bencher) {
+    let shader = Engine::new().compile("long", &long()).expect("compiles");
+    bencher.bench(|| shader.material(black_box(&[])));
+}
+
+fn shade(bencher: Bencher, text: &str) {
+    let material = material(text);
+    let mut tree = overcoat::closure::ClosureTree::new();
+    let mut globals = Globals::default();
+    bencher.bench_local(|| {
+        globals.u = (globals.u + 0.37) % 1.0;
+        globals.p.x = globals.u;
+        globals.p.y = 1.0 - globals.u;
+        material.program().shade(black_box(&globals), &mut tree)
+    });
+}
+
+#[divan::bench]
+fn shade_velvet(bencher: Bencher) {
+    shade(bencher, VELVET);
+}
+
+#[divan::bench]
+fn shade_velvet_varying(bencher: Bencher) {
+    shade(bencher, "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);");
+}
+
+#[divan::bench]
+fn shade_noise(bencher: Bencher) {
+    shade(bencher, NOISE);
+}
+
+fn main() {
+    divan::main();
+}

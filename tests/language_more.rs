@@ -1,0 +1,158 @@
+//! Corners of the language that need more than a value: parameters in parts, loops that the proof follows, loops that
+//! run at the point, random programs of loops and functions, and a replay of the corpus cut and joined.
+
+use overcoat::closure::ClosureTree;
+use overcoat::ir::{self, Value};
+use overcoat::{Engine, Globals};
+use proptest::prelude::*;
+
+fn weight(script: &str, set: &[(&str, Value)], u: f32) -> f32 {
+    let shader = Engine::new().compile("a.osl", script).unwrap_or_else(|e| panic!("{e}"));
+    let set: Vec<_> = set.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();
+    let material = shader.material(&set).unwrap_or_else(|e| panic!("{e}"));
+    let mut tree = ClosureTree::new();
+    material.program().shade(&Globals { u, ..Globals::default() }, &mut tree).expect("within budget");
+    match tree.node(tree.root()) {
+        overcoat::closure::Node::Mul(w, _) => w[0],
+        overcoat::closure::Node::Lobe { .. } => 1.0,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn parts_of_parameters_are_set_by_name() {
+    let script = "struct pair { float x; float y; };
+        surface s(pair p = {0.1, 0.2}, float a[2] = {0.3, 0.4}, matrix m = 0.5, pair q[2] = {{1, 2}, {3, 4}}) {
+            Ci = (p.x + 10 * p.y + a[0] + 10 * a[1] + m[1][1] + q[1].y) * diffuse(N);
+        }";
+    assert_eq!(weight(script, &[], 0.0), 0.1 + 2.0 + 0.3 + 4.0 + 0.5 + 4.0);
+    let set = [("p.y", Value::Float(0.0)), ("a[1]", Value::Float(0.0)), ("m[1][1]", Value::Float(0.0))];
+    assert_eq!(weight(script, &[&set[..], &[("q[1].y", Value::Float(1.0))]].concat(), 0.0), 0.1 + 0.3 + 1.0);
+    let shader = Engine::new().compile("a.osl", script).expect("compiles");
+    assert!(shader.material(&[("p".to_owned(), Value::Float(1.0))]).is_err());
+    let names: Vec<_> = shader.params().iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(&names[..4], ["p.x", "p.y", "a[0]", "a[1]"]);
+}
+
+#[test]
+fn an_unknown_noise_is_refused() {
+    let e = Engine::new().compile("a", "float x = noise(\"gabor\", u); Ci = x * diffuse(N);").expect_err("refused");
+    assert_eq!(e.diagnostics[0].code, "E0303");
+}
+
+#[test]
+fn exit_is_refused() {
+    let e = Engine::new().compile("a", "Ci = diffuse(N); exit();").expect_err("refused");
+    assert_eq!(e.diagnostics[0].code, "E0109");
+}
+
+#[test]
+fn early_returns_leave_the_shader() {
+    let script = "surface s(float k = 1) { Ci = 0.5 * diffuse(N); if (u > 0.5) return; Ci = 0.25 * diffuse(N);
+        for (int i = 0; i < 9; i++) { if (u > 0.1 * i) continue; if (i > 2) return; Ci = 0.125 * diffuse(N); } }";
+    assert_eq!((weight(script, &[], 0.7), weight(script, &[], 0.3), weight(script, &[], 0.1)), (0.5, 0.25, 0.125));
+}
+
+/// A statement over `a`, `b`, `n` and `t`, with `X` for a number known early or late.
+fn statement() -> impl Strategy<Value = String> {
+    let simple = prop::sample::select(vec![
+        "a += X;",
+        "b = a * 0.5;",
+        "t[n % 3] = a;",
+        "a = t[n % 3 + 0];",
+        "n++;",
+        "n += 2;",
+        "a = f(a, b);",
+        "g(a, n);",
+        "b = n++ * X;",
+        "p = p + pair(a, X);",
+        "a = p.y;",
+        "if (a > 4) break;",
+        "if (b > a) continue;",
+        "a = h(n);",
+        "b = a > 1 ? f(b, a) : h(n);",
+        "n = (a > 1) && (b = X);",
+        "p = p * X;",
+        "t[1] = p.x;",
+        "a = mod(a, 7);",
+    ])
+    .prop_map(str::to_owned);
+    simple.prop_recursive(3, 14, 4, |inner| {
+        let block = prop::collection::vec(inner, 1..4).prop_map(|v| v.concat());
+        prop_oneof![
+            (block.clone(), 1..5).prop_map(|(b, k)| format!("for (int i = 0; i < {k}; i++) {{ {b} }}")),
+            (block.clone(), 1..4).prop_map(|(b, k)| format!("{{ int w = 0; while (w < {k} + X) {{ w++; {b} }} }}")),
+            (block.clone(), block.clone()).prop_map(|(b, c)| format!("if (a < X + 1) {{ {b} }} else {{ {c} }}")),
+            block.prop_map(|b| format!("do {{ {b} }} while (n++ < 3);")),
+        ]
+    })
+}
+
+const LIBRARY: &str = "struct pair { float x; float y; };
+    pair __operator__add__(pair a, pair b) { return pair(a.x + b.x, a.y + b.y); }
+    pair __operator__mul__(pair a, float k) { pair r = a; r.x *= k; r.y *= k; return r; }
+    float f(float x, float y) { if (x > y) return x - y; return mod(x + y, 5); }
+    void g(output float x, output int n) { x = mod(x * 2, 9); n = n > 20 ? 0 : n + 1; }
+    float h(int n) { float s = 0; for (int i = 0; i < 6; i++) { if (i > n) return s; s += i; } return -1; }";
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(80) })]
+
+    /// What is known early and what is known late give the same value, whatever the loops do.
+    #[test]
+    fn folding_loops_and_functions_changes_nothing(body in prop::collection::vec(statement(), 1..5)) {
+        let body = format!("for (int once = 0; once < 1; once++) {{ {} }}", body.concat());
+        let script = |known: &str| {
+            format!("{LIBRARY} surface s(float k = 0.375) {{ float a = X, b = 0.5; int n = 1; float t[3] = {{X, 2, 3}};
+                pair p = {{1, X}}; {body} float all = a + 3 * b + 5 * n + 7 * t[0] + 11 * t[1] + 13 * t[2] + 17 * p.x + 19 * p.y;
+                Ci = (1 + abs(mod(all, 1000))) * diffuse(N); }}").replace('X', known)
+        };
+        let run = |known: &str| {
+            let (shader, _) = ir::compile("s", &script(known)).unwrap_or_else(|e| panic!("{e:?}"));
+            let mut tree = ClosureTree::new();
+            let globals = Globals { u: 0.375, ..Globals::default() };
+            let shaded = shader.specialise(&[]).expect("specialises").shade(&globals, &mut tree);
+            let open = shader.unspecialised().shade(&globals, &mut ClosureTree::new());
+            assert_eq!(shaded.is_ok(), open.is_ok());
+            shaded.map(|()| match tree.node(tree.root()) {
+                overcoat::closure::Node::Mul(w, _) => w,
+                _ => [0.0; 3],
+            })
+        };
+        let early = run("0.375");
+        prop_assert_eq!(&early, &run("u"));
+        prop_assert_eq!(&early, &run("k"));
+    }
+}
+
+/// The corpus cut anywhere, and pieces of it joined: what fuzzing does, in small.
+#[test]
+fn the_corpus_is_survived_in_pieces() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+    let mut texts = Vec::new();
+    for folder in ["osl", "err", "ok"] {
+        for entry in std::fs::read_dir(root.join(folder)).expect("a folder").flatten() {
+            texts.push(std::fs::read_to_string(entry.path()).expect("text"));
+        }
+    }
+    texts.sort();
+    let survive = |text: &str| {
+        if let Ok((shader, _)) = ir::compile("test.osl", text)
+            && let Ok(program) = shader.specialise(&[])
+        {
+            let _ = program.shade(&Globals::default(), &mut ClosureTree::new());
+        }
+    };
+    let mut rounds = 0u64;
+    for (i, text) in texts.iter().enumerate() {
+        let pieces: Vec<&str> = text.split_inclusive([';', '{', '}', '\n']).collect();
+        for k in (0..pieces.len()).step_by(pieces.len() / 12 + 1) {
+            let other: Vec<&str> = texts[(i * 7 + k) % texts.len()].split_inclusive([';', '\n']).collect();
+            survive(&pieces[..k].concat());
+            survive(&[&pieces[..k], &pieces[k + 1..]].concat().concat());
+            survive(&[&pieces[..k], &other[other.len() / 2..], &pieces[k..]].concat().concat());
+            rounds += 3;
+        }
+    }
+    assert!(rounds > 500, "{rounds}");
+}
