@@ -53,6 +53,85 @@ fn early_returns_leave_the_shader() {
     assert_eq!((weight(script, &[], 0.7), weight(script, &[], 0.3), weight(script, &[], 0.1)), (0.5, 0.25, 0.125));
 }
 
+/// Compiles, and where that works shades, on a stack as small as a test thread's; within a time that no blow-up takes.
+fn digest(script: String) -> String {
+    let run = move || {
+        let start = std::time::Instant::now();
+        let outcome = match ir::compile("test.osl", &script) {
+            Err(errors) => errors[0].code.to_owned(),
+            Ok((shader, _)) => match shader.specialise(&[]) {
+                Err(errors) => errors[0].code.to_owned(),
+                Ok(program) => match program.shade(&Globals::default(), &mut ClosureTree::new()) {
+                    Ok(()) => "fine".to_owned(),
+                    Err(e) => e.to_string(),
+                },
+            },
+        };
+        assert!(start.elapsed().as_secs() < 5, "{outcome} after {:?}", start.elapsed());
+        outcome
+    };
+    std::thread::Builder::new().stack_size(2 << 20).spawn(run).expect("a thread").join().expect("no panic")
+}
+
+#[test]
+fn extremes_of_the_language_come_to_an_end() {
+    let many = |n: usize, s: &str| s.repeat(n);
+    let chain = |n: usize, body: &dyn Fn(usize) -> String| -> String {
+        let mut text = "float f0(float x) { return x; }\n".to_owned();
+        (0..n).for_each(|i| text += &format!("float f{}(float x) {{ {} }}\n", i + 1, body(i)));
+        text + &format!("Ci = f{n}(u) * diffuse(N);")
+    };
+    // Calls within blocks within calls.
+    let deep = |i: usize| format!("{} return f{i}(x); {} return 0;", many(20, "if (x >= 0) { "), many(20, "}"));
+    assert_eq!(digest(chain(10, &deep)), "fine");
+    assert_eq!(digest(chain(40, &deep)), "E0212");
+    let returns = |i: usize| format!("{} return f{i}(x);", many(100, "if (x > 2) return x; "));
+    assert_eq!(digest(chain(20, &returns)), "fine");
+    assert_eq!(
+        digest(format!(
+            "float f(float x) {{ {} return x; }} Ci = f(u) * diffuse(N);",
+            many(5000, "if (x > 2) return 3; ")
+        )),
+        "fine"
+    );
+    // Loops within loops, none of a known length, and chains of assignments within one.
+    let nested =
+        |head: &str, n: usize| format!("float x; {}x += 1;{} Ci = x * diffuse(N);", many(n, head), many(n, "}"));
+    assert_eq!(digest(nested("while (x < u) { ", 100)), "fine");
+    assert_eq!(digest(nested("for (int i = 0; i < 1; i++) { ", 100)), "fine");
+    assert_eq!(digest(nested("do { ", 100).replace("}", "} while (x < u);")), "fine");
+    let assigned: String = (0..3000).map(|i| format!("a[{}] = a[{i}] + u; ", i + 1)).collect();
+    let backward: String = (0..3000).rev().map(|i| format!("a[{}] = a[{i}] + u; ", i + 1)).collect();
+    for body in [assigned, backward] {
+        let script =
+            format!("float a[3001]; for (float x = 0; x < u + 1; x += 1) {{ {body} }} Ci = a[3000] * diffuse(N);");
+        assert_eq!(digest(script), "fine");
+    }
+    // Many uses of macros, nested uses, large arrays, wide calls.
+    assert_eq!(
+        digest(format!("#define A(x) (x)\nfloat y = {}1;\nCi = y * diffuse(N);", many(50_000, "A(1) +\n"))),
+        "fine"
+    );
+    assert_eq!(digest(format!("#define A(x) (x)\nfloat y = {}1{};", many(10_000, "A("), many(10_000, ")"))), "E0111");
+    assert_eq!(
+        digest("float a[60000]; int i = (int) u; a[i] = 1; Ci = (1 + a[i + 1]) * diffuse(N);".to_owned()),
+        "fine"
+    );
+    assert_eq!(
+        digest(
+            format!("float x = {}u{}; Ci = x * diffuse(N);", many(60, "f(f("), many(60, "))"))
+                .replace("float x", "float f(float x) { return x; } float x")
+        ),
+        "fine"
+    );
+    assert_eq!(digest(format!("#if {}1{}\n#endif\nCi = diffuse(N);", many(50_000, "("), many(50_000, ")"))), "E0104");
+    assert_eq!(digest(many(100_000, "#if 1\n")), "E0104");
+    assert_eq!(digest(format!("{}Ci = diffuse(N);", many(20_000, "{ int i = 0; i++; }"))), "fine");
+    let ternaries =
+        format!("float f(float x) {{ return x; }} float y = {}3; Ci = y * diffuse(N);", many(120, "u > 1 ? f(2) : "));
+    assert_eq!(digest(ternaries), "fine");
+}
+
 /// A statement over `a`, `b`, `n` and `t`, with `X` for a number known early or late.
 fn statement() -> impl Strategy<Value = String> {
     let simple = prop::sample::select(vec![

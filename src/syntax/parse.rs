@@ -342,7 +342,11 @@ impl<'m> Builder<'m> {
     fn inner(&mut self, statement: Pair) -> Stmt {
         let mut body = Vec::new();
         self.statement(statement, &mut body);
-        Stmt::Block(body)
+        match &mut body[..] {
+            // Braces are a block already.
+            [Stmt::Block(inner)] => Stmt::Block(std::mem::take(inner)),
+            _ => Stmt::Block(body),
+        }
     }
 
     fn repetition(&mut self, pair: Pair, out: &mut Vec<Stmt>) {

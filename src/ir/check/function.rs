@@ -157,7 +157,6 @@ impl<'a> Checker<'a> {
         let pending = std::mem::take(&mut self.pending);
         let names = std::mem::take(&mut self.names);
         let shadowed = std::mem::take(&mut self.shadowed);
-        let chain = std::mem::take(&mut self.chain);
         let frame = std::mem::replace(&mut self.frame, Frame { ty, result, live, loops: Vec::new() });
         self.stack.push(index);
         let mark = self.open_scope();
@@ -174,7 +173,6 @@ impl<'a> Checker<'a> {
         self.close_scope(mark);
         self.stack.pop();
         self.frame = frame;
-        self.chain = chain;
         self.shadowed = shadowed;
         self.names = names;
         self.pending = pending;

@@ -28,8 +28,8 @@ pub(super) struct Scope {
     round: VarId,
 }
 
-/// `if` after `if` that are folded into each other before variables are used instead.
-const MAX_CHAIN: usize = 40;
+/// `if` after `if` that are folded into each other, calls included, before variables are used instead.
+const MAX_CHAIN: usize = 60;
 
 impl Checker<'_> {
     /// Statements one after the other.
@@ -145,9 +145,9 @@ impl Checker<'_> {
         let at = self.ast.expr(condition.root).span;
         let root = self.truth(value, at);
         let condition = Root { first: self.run_start, root };
-        let (then_flow, mut then) = self.inner_block(std::slice::from_ref(then));
+        let (then_flow, mut then) = self.inner_block(within(then));
         let (other_flow, mut other) = match other {
-            Some(stmt) => self.inner_block(std::slice::from_ref(stmt)),
+            Some(stmt) => self.inner_block(within(stmt)),
             None => (Flow::Goes, Vec::new()),
         };
         let one_leaves = (then_flow == Flow::Leaves) != (other_flow == Flow::Leaves);
@@ -221,7 +221,7 @@ impl Checker<'_> {
             if exits.any() {
                 c.set(scope.round, 1);
             }
-            let (_, block) = c.inner_block(std::slice::from_ref(&inner.body));
+            let (_, block) = c.inner_block(within(&inner.body));
             c.block.extend(block);
         });
         let step = self.piece(|c| inner.step.into_iter().for_each(|step| c.action(step)));
@@ -371,6 +371,14 @@ impl Checker<'_> {
     pub(super) fn zero(&mut self, ty: Ty, span: Span) -> ExprId {
         let kind = if ty == Ty::Closure { ExprKind::Black } else { ExprKind::Const([0; 3]) };
         self.body.push(kind, ty, span)
+    }
+}
+
+/// The statements of a block, or the one there is.
+fn within(stmt: &ast::Stmt) -> &[ast::Stmt] {
+    match stmt {
+        ast::Stmt::Block(stmts) => stmts,
+        other => std::slice::from_ref(other),
     }
 }
 

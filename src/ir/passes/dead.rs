@@ -18,6 +18,9 @@ pub fn remove(mut body: Body) -> Body {
     body
 }
 
+/// Passes over a loop in search of what it needs before it is taken to need everything.
+const MAX_PASSES: usize = 40;
+
 struct Sweep<'a> {
     body: &'a Body,
     wanted: Env<bool>,
@@ -57,7 +60,10 @@ impl Sweep<'_> {
                         continue;
                     }
                     self.reads(condition);
-                    while self.grow(&before) | self.grow(&body) {}
+                    let mut passes = 0;
+                    while self.grow(&body, passes > MAX_PASSES) | self.grow(&before, passes > MAX_PASSES) {
+                        passes += 1;
+                    }
                     let (before, body) = (self.filter(before), self.filter(body));
                     kept.push(Stmt::Loop { before, condition, body, span });
                 }
@@ -87,13 +93,14 @@ impl Sweep<'_> {
         found || is_heard(stmts)
     }
 
-    /// Wants what statements need that write what is wanted; true if that was news.
-    fn grow(&mut self, stmts: &[Stmt]) -> bool {
+    /// Wants what statements need that write what is wanted – or, with `all`, what any of them needs; true if that was
+    /// news. Users mostly come after what they use, so the last is looked at first.
+    fn grow(&mut self, stmts: &[Stmt], all: bool) -> bool {
         let mut grew = false;
-        for stmt in stmts {
+        for stmt in stmts.iter().rev() {
             match stmt {
                 Stmt::Assign(var, root) => {
-                    if self.wanted.get(*var) {
+                    if all || self.wanted.get(*var) {
                         grew |= self.reads(*root);
                     }
                 }
@@ -112,7 +119,7 @@ impl Sweep<'_> {
                 Stmt::Loop { before: then, condition, body: other, .. } | Stmt::If { condition, then, other } => {
                     if self.touches(then) || self.touches(other) {
                         grew |= self.reads(*condition);
-                        grew |= self.grow(then) | self.grow(other);
+                        grew |= self.grow(other, all) | self.grow(then, all);
                     }
                 }
             }

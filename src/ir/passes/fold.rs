@@ -220,6 +220,10 @@ impl<'a> Folder<'a> {
 
     /// Writes out the rounds of a loop whose number is known; false, and nothing done, if it is not known or too large.
     fn unrolled(&mut self, before: &[Stmt], condition: Root, body: &[Stmt], out: &mut Vec<Stmt>) -> bool {
+        if self.unrolling == 0 {
+            // Trying costs as much as doing, and loops nest.
+            return false;
+        }
         let (mark, length) = (self.env.enter(), out.len());
         let (exprs, args) = (self.new.exprs.len(), self.new.args.len());
         for _ in 0..MAX_ROUNDS {

@@ -24,7 +24,9 @@ const MAX_DEPTH: usize = 128;
 pub struct Macros {
     by_name: HashMap<String, Macro>,
     /// Bytes produced so far.
-    pub spent: usize,
+    spent: usize,
+    /// Uses within arguments and bodies of uses that are open.
+    depth: usize,
 }
 
 /// Where a name is used: for `__LINE__` and `__FILE__`.
@@ -111,6 +113,16 @@ impl Macros {
     }
 
     fn expand_within(&mut self, text: &str, at: &Use, open: &mut Vec<String>) -> Result<String, Trouble> {
+        if self.depth >= MAX_DEPTH {
+            return Err(Trouble::Budget);
+        }
+        self.depth += 1;
+        let expanded = self.expand_once(text, at, open);
+        self.depth -= 1;
+        expanded
+    }
+
+    fn expand_once(&mut self, text: &str, at: &Use, open: &mut Vec<String>) -> Result<String, Trouble> {
         let mut out = String::with_capacity(text.len());
         let mut rest = text;
         while !rest.is_empty() {
@@ -155,9 +167,6 @@ impl Macros {
             _ => {}
         }
         let Some(definition) = self.by_name.get(name).cloned() else { return Ok(name.to_owned()) };
-        if open.len() >= MAX_DEPTH {
-            return Err(Trouble::Budget);
-        }
         let body = match (&definition.params, given) {
             (Some(params), Some(given)) => self.filled(name, &definition, params, given, at, open)?,
             _ => joined(&definition.body),
@@ -306,8 +315,8 @@ pub fn arguments_of(text: &str) -> Result<Option<(Vec<String>, &str)>, Trouble> 
     let Some(mut rest) = open.strip_prefix('(') else { return Ok(None) };
     let (mut given, mut now, mut depth) = (Vec::new(), String::new(), 0usize);
     while !rest.is_empty() {
-        let (piece, _) = next_piece(rest);
-        if piece.starts_with('"') || piece.starts_with(is_word) {
+        if rest.starts_with(|c| c == '"' || is_word(c)) {
+            let (piece, _) = next_piece(rest);
             now.push_str(piece);
             rest = &rest[piece.len()..];
             continue;

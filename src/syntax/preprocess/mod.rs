@@ -61,6 +61,7 @@ pub fn preprocess(name: &str, text: &str, options: &Options) -> Result<Preproces
         once: HashSet::new(),
         depth: 0,
         included: 0,
+        last_line: (0, 0, 1),
     };
     let (major, minor, patch) = VERSION;
     run.macros.define("OSL_VERSION_MAJOR", &major.to_string());
@@ -96,6 +97,8 @@ struct Run<'a> {
     depth: usize,
     /// Bytes of included files.
     included: usize,
+    /// The last place whose line was counted: file, byte, line.
+    last_line: (u32, usize, usize),
 }
 
 /// An `#if` that is open.
@@ -205,7 +208,7 @@ impl Run<'_> {
     }
 
     fn expand(&mut self, file: &File, text: &str, span: Span) -> Option<String> {
-        let line = file.text.text[..span.start as usize].matches('\n').count() + 1;
+        let line = self.line(file, span.start as usize);
         let budget = self.options.limits.expanded_bytes;
         let d = match self.macros.expand(text, &Use { line, file: file.name, budget }) {
             Ok(text) => return Some(text),
@@ -220,6 +223,15 @@ impl Run<'_> {
             self.errors.push(d);
         }
         None
+    }
+
+    /// The line of a place; counted on from the last one asked for.
+    fn line(&mut self, file: &File, at: usize) -> usize {
+        let (id, from, line) = self.last_line;
+        let (from, line) = if id == file.id && from <= at { (from, line) } else { (0, 1) };
+        let line = line + file.text.text[from..at].matches('\n').count();
+        self.last_line = (file.id, at, line);
+        line
     }
 
     fn directive(&mut self, file: &mut File, start: usize, end: usize) {
