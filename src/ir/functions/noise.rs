@@ -55,6 +55,7 @@ impl At {
 }
 
 /// Mixes up to four words (Jenkins' one-at-a-time, with a final avalanche).
+#[inline(always)]
 fn hash(words: &[u32; 4], n: usize, channel: u32) -> u32 {
     let mut h = 0x9e37_79b9u32.wrapping_mul(channel.wrapping_add(n as u32 * 8 + 1));
     for word in &words[..n] {
@@ -81,6 +82,7 @@ fn unit(h: u32) -> f32 {
 }
 
 /// The dot product of a hashed gradient with an offset.
+#[inline(always)]
 fn gradient(h: u32, x: &[f32; 4], n: usize) -> f32 {
     if n == 1 {
         // Slopes ±1/8 to ±1.
@@ -102,20 +104,40 @@ fn gradient(h: u32, x: &[f32; 4], n: usize) -> f32 {
 
 /// What brings each dimension's gradient noise to ±1: one over the largest value any gradients give.
 fn perlin(at: &At, channel: u32) -> f32 {
-    let n = at.n;
+    // One body per dimension: its loops are of known length then, which is most of the speed.
+    match at.n {
+        1 => perlin_in::<1>(at, channel),
+        2 => perlin_in::<2>(at, channel),
+        3 => perlin_in::<3>(at, channel),
+        _ => perlin_in::<4>(at, channel),
+    }
+}
+
+fn perlin_in<const N: usize>(at: &At, channel: u32) -> f32 {
     let floor = at.x.map(f32::floor);
     let offset: [f32; 4] = std::array::from_fn(|d| at.x[d] - floor[d]);
     let fade = offset.map(|t| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
+    // The two cells, offsets and shares along each coordinate.
+    let mut cells = [[0u32; 2]; N];
+    let mut shares = [[0.0f32; 2]; N];
+    for d in 0..N {
+        cells[d] = [at.wrapped(floor[d], d), at.wrapped(floor[d] + 1.0, d)];
+        shares[d] = [1.0 - fade[d], fade[d]];
+    }
     let mut sum = 0.0;
-    for corner in 0..1u32 << n {
-        let step = |d: usize| (corner >> d & 1) as f32;
-        let cell = std::array::from_fn(|d| at.wrapped(floor[d] + step(d), d));
-        let toward = std::array::from_fn(|d| offset[d] - step(d));
-        let share: f32 = (0..n).map(|d| if step(d) == 1.0 { fade[d] } else { 1.0 - fade[d] }).product();
-        sum += share * gradient(hash(&cell, n, channel), &toward, n);
+    for corner in 0..1usize << N {
+        let (mut cell, mut toward) = ([0u32; 4], [0.0f32; 4]);
+        let mut share = 1.0;
+        for d in 0..N {
+            let step = corner >> d & 1;
+            cell[d] = cells[d][step];
+            toward[d] = offset[d] - step as f32;
+            share *= shares[d][step];
+        }
+        sum += share * gradient(hash(&cell, N, channel), &toward, N);
     }
     // At the middle of a cell all corners' gradients may agree; the largest such sum is known per dimension.
-    let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][n - 1];
+    let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
     (sum / largest).clamp(-1.0, 1.0)
 }
 
