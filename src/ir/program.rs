@@ -262,21 +262,8 @@ impl Program {
                     let index = options.iter().position(|option| *option == name).unwrap_or(0);
                     cells[dst as usize] = (index as f32).to_bits();
                 }
-                Instr::Element { width, dst, base, len, index } => {
-                    let at = limited(cells[index as usize], len);
-                    let value = read(&cells, base + at * u32::from(width), width as usize);
-                    write(&mut cells, dst, width as usize, value);
-                }
-                Instr::ElementC { dst, base, len, index } => {
-                    closures[dst as usize] = closures[(base + limited(cells[index as usize], len)) as usize];
-                }
-                Instr::Store { width, base, len, index, src } => {
-                    let at = limited(cells[index as usize], len);
-                    let value = read(&cells, src, width as usize);
-                    write(&mut cells, base + at * u32::from(width), width as usize, value);
-                }
-                Instr::StoreC { base, len, index, src } => {
-                    closures[(base + limited(cells[index as usize], len)) as usize] = closures[src as usize];
+                Instr::Element { .. } | Instr::ElementC { .. } | Instr::Store { .. } | Instr::StoreC { .. } => {
+                    indexed(*instr, &mut cells, &mut closures);
                 }
                 Instr::Do { deed } => {
                     let host = self.host.as_deref();
@@ -348,6 +335,29 @@ impl Call {
         for ((ty, reg), (_, value)) in self.outs.iter().zip(outs) {
             write(cells, *reg, ty.cells(), value);
         }
+    }
+}
+
+/// Reads or writes one of several registers.
+fn indexed(instr: Instr, cells: &mut [u32], closures: &mut [NodeId]) {
+    match instr {
+        Instr::Element { width, dst, base, len, index } => {
+            let at = limited(cells[index as usize], len);
+            let value = read(cells, base + at * u32::from(width), width as usize);
+            write(cells, dst, width as usize, value);
+        }
+        Instr::ElementC { dst, base, len, index } => {
+            closures[dst as usize] = closures[(base + limited(cells[index as usize], len)) as usize];
+        }
+        Instr::Store { width, base, len, index, src } => {
+            let at = limited(cells[index as usize], len);
+            let value = read(cells, src, width as usize);
+            write(cells, base + at * u32::from(width), width as usize, value);
+        }
+        Instr::StoreC { base, len, index, src } => {
+            closures[(base + limited(cells[index as usize], len)) as usize] = closures[src as usize];
+        }
+        _ => {}
     }
 }
 
