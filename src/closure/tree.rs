@@ -55,6 +55,8 @@ pub struct ClosureTree {
     sizes: SmallVec<[Size; 40]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
+    /// The number of the tree this is a copy of but for directions; 0 once it is changed otherwise.
+    copy_of: u64,
 }
 
 /// How much a node comes to when it is written out in full: a node may be used twice, so a tree of sixty nodes can
@@ -117,8 +119,13 @@ impl Default for ClosureTree {
 impl ClosureTree {
     /// A black tree.
     pub fn new() -> Self {
-        let mut tree =
-            ClosureTree { nodes: SmallVec::new(), sizes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0) };
+        let mut tree = ClosureTree {
+            nodes: SmallVec::new(),
+            sizes: SmallVec::new(),
+            slots: SmallVec::new(),
+            root: NodeId(0),
+            copy_of: 0,
+        };
         tree.push(Node::Zero);
         tree
     }
@@ -129,6 +136,27 @@ impl ClosureTree {
         self.sizes.truncate(1);
         self.slots.clear();
         self.root = NodeId(0);
+        self.copy_of = 0;
+    }
+
+    /// Becomes a copy of the tree with this number; nothing is to do if it is one already.
+    pub(crate) fn become_copy(&mut self, id: u64, other: &ClosureTree) {
+        if self.copy_of == id {
+            return;
+        }
+        self.clear();
+        self.nodes.clear();
+        self.sizes.clear();
+        self.nodes.extend_from_slice(&other.nodes);
+        self.sizes.extend_from_slice(&other.sizes);
+        self.slots.extend_from_slice(&other.slots);
+        self.root = other.root;
+        self.copy_of = id;
+    }
+
+    /// Changes a direction among the parameters of a lobe.
+    pub(crate) fn set_direction(&mut self, slot: u32, value: [f32; 3]) {
+        self.slots[slot as usize..slot as usize + 3].copy_from_slice(&value);
     }
 
     /// The black closure.
@@ -181,13 +209,29 @@ impl ClosureTree {
     /// not in a script.
     pub fn lobe(&mut self, kind: LobeKind, site: u32, values: &[f32]) -> NodeId {
         assert_eq!(values.len(), kind.spec().slot_count(), "parameter block of `{}`", kind.spec().name);
-        let slots = self.slots.len() as u32;
-        self.slots.extend_from_slice(values);
-        self.push(Node::Lobe { kind, site, slots })
+        self.lobe_from(kind, site, values, std::iter::empty())
+    }
+
+    /// A lobe whose parameter block is `known` but for the slots in `open`.
+    pub(crate) fn lobe_from(
+        &mut self,
+        kind: LobeKind,
+        site: u32,
+        known: &[f32],
+        open: impl Iterator<Item = (u32, f32)>,
+    ) -> NodeId {
+        let start = self.slots.len();
+        self.slots.extend_from_slice(known);
+        let slots = &mut self.slots[start..];
+        for (slot, value) in open {
+            slots[slot as usize] = value;
+        }
+        self.push(Node::Lobe { kind, site, slots: start as u32 })
     }
 
     /// Makes `root` the closure the tree stands for.
     pub fn set_root(&mut self, root: NodeId) {
+        self.copy_of = 0;
         self.root = root;
     }
 
@@ -229,6 +273,14 @@ impl ClosureTree {
         })
     }
 
+    /// Of every lobe node made: its site and where its values start.
+    pub(crate) fn lobe_slots(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.nodes.iter().filter_map(|n| match *n {
+            Node::Lobe { site, slots, .. } => Some((site, slots)),
+            _ => None,
+        })
+    }
+
     /// What a node comes to, written out.
     pub fn size(&self, id: NodeId) -> Size {
         self.sizes[id.index()]
@@ -264,6 +316,7 @@ impl ClosureTree {
         };
         self.nodes.push(node);
         self.sizes.push(size);
+        self.copy_of = 0;
         id
     }
 }

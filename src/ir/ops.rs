@@ -4,6 +4,7 @@
 use super::body::{Cells, Op};
 
 /// The value of an operation that touches no closure; `n` is the number of components of its operands.
+#[inline]
 pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
     let float = |f: fn(f32, f32) -> f32| {
         let mut out = [0; 3];
@@ -70,6 +71,20 @@ pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
             }
         }
         Op::AddC | Op::MulC | Op::Layer => [0; 3],
+    }
+}
+
+/// The value of arithmetic on the components of triples: [`apply`] for three, without asking how many.
+#[inline(always)]
+pub fn componentwise(op: Op, a: Cells, b: Cells) -> Cells {
+    let each =
+        |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f32::from_bits(a[k]), f32::from_bits(b[k])).to_bits());
+    match op {
+        Op::AddF => each(|a, b| a + b),
+        Op::SubF => each(|a, b| a - b),
+        Op::MulF => each(|a, b| a * b),
+        Op::DivF => each(divide),
+        _ => apply(op, 3, a, b, [0; 3]),
     }
 }
 
