@@ -81,23 +81,23 @@ fn shade(bencher: Bencher, text: &str) {
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_velvet(bencher: Bencher) {
     shade(bencher, VELVET);
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_velvet_varying(bencher: Bencher) {
     shade(bencher, "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);");
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_noise(bencher: Bencher) {
     shade(bencher, NOISE);
 }
 
 /// From a point to a BSDF: the tree and its preparation for one direction.
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn velvet_to_bsdf(bencher: Bencher) {
     let material = material(VELVET);
     let globals = Globals::default();

@@ -51,8 +51,8 @@ pub const MAX_WEIGHT: f32 = 1e30;
 /// Closures as a shader composes them. Build with the methods below; the last call is to [`set_root`](Self::set_root).
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
-    nodes: SmallVec<[Node; 40]>,
-    sizes: SmallVec<[Size; 40]>,
+    /// With what each comes to.
+    nodes: SmallVec<[(Node, Size); 40]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
     /// The number of the tree this is a copy of but for directions; 0 once it is changed otherwise.
@@ -119,13 +119,7 @@ impl Default for ClosureTree {
 impl ClosureTree {
     /// A black tree.
     pub fn new() -> Self {
-        let mut tree = ClosureTree {
-            nodes: SmallVec::new(),
-            sizes: SmallVec::new(),
-            slots: SmallVec::new(),
-            root: NodeId(0),
-            copy_of: 0,
-        };
+        let mut tree = ClosureTree { nodes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0), copy_of: 0 };
         tree.push(Node::Zero);
         tree
     }
@@ -133,7 +127,6 @@ impl ClosureTree {
     /// Back to black, keeping what memory there is.
     pub fn clear(&mut self) {
         self.nodes.truncate(1);
-        self.sizes.truncate(1);
         self.slots.clear();
         self.root = NodeId(0);
         self.copy_of = 0;
@@ -146,9 +139,7 @@ impl ClosureTree {
         }
         self.clear();
         self.nodes.clear();
-        self.sizes.clear();
         self.nodes.extend_from_slice(&other.nodes);
-        self.sizes.extend_from_slice(&other.sizes);
         self.slots.extend_from_slice(&other.slots);
         self.root = other.root;
         self.copy_of = id;
@@ -221,7 +212,8 @@ impl ClosureTree {
         open: impl Iterator<Item = (u32, f32)>,
     ) -> NodeId {
         let start = self.slots.len();
-        self.slots.extend_from_slice(known);
+        // A block is short: `extend_from_slice` would call to copy it.
+        self.slots.extend(known.iter().copied());
         let slots = &mut self.slots[start..];
         for (slot, value) in open {
             slots[slot as usize] = value;
@@ -242,7 +234,7 @@ impl ClosureTree {
 
     /// What a node is.
     pub fn node(&self, id: NodeId) -> Node {
-        self.nodes[id.index()]
+        self.nodes[id.index()].0
     }
 
     /// The node made at this place, counted from the black one.
@@ -267,7 +259,7 @@ impl ClosureTree {
 
     /// Every lobe node made: its site, kind and parameter block.
     pub fn lobes(&self) -> impl Iterator<Item = (u32, LobeKind, &[f32])> {
-        self.nodes.iter().filter_map(|n| match *n {
+        self.nodes.iter().filter_map(|(n, _)| match *n {
             Node::Lobe { kind, site, slots } => Some((site, kind, self.values(kind, slots))),
             _ => None,
         })
@@ -275,7 +267,7 @@ impl ClosureTree {
 
     /// Of every lobe node made: its site and where its values start.
     pub(crate) fn lobe_slots(&self) -> impl Iterator<Item = (u32, u32)> {
-        self.nodes.iter().filter_map(|n| match *n {
+        self.nodes.iter().filter_map(|(n, _)| match *n {
             Node::Lobe { site, slots, .. } => Some((site, slots)),
             _ => None,
         })
@@ -283,7 +275,7 @@ impl ClosureTree {
 
     /// What a node comes to, written out.
     pub fn size(&self, id: NodeId) -> Size {
-        self.sizes[id.index()]
+        self.nodes[id.index()].1
     }
 
     /// Whether the tree is within [`MAX_LOBES`] and [`MAX_LAYERS`].
@@ -314,8 +306,7 @@ impl ClosureTree {
                 Size { layers: size.layers.saturating_add(1), ..size }
             }
         };
-        self.nodes.push(node);
-        self.sizes.push(size);
+        self.nodes.push((node, size));
         self.copy_of = 0;
         id
     }

@@ -20,7 +20,8 @@ impl Program {
     pub(super) fn run(&self, globals: &Globals, tree: &mut ClosureTree) -> Result<(), ShadeError> {
         tree.clear();
         let mut cells: SmallVec<[u32; 512]> = SmallVec::from_slice(&self.image);
-        let mut closures: SmallVec<[NodeId; 32]> = SmallVec::from_elem(tree.zero(), self.closures);
+        let mut closures: SmallVec<[NodeId; 32]> = SmallVec::new();
+        closures.resize(self.closures, tree.zero());
         let (cells, closures) = (&mut cells[..], &mut closures[..]);
         let mut rounds = self.iterations;
         let mut strings = Strings::new(&self.strings);
@@ -30,8 +31,7 @@ impl Program {
             match *instr {
                 Instr::Global { global, dst } => write(cells, dst, global.ty().cells(), global.read(globals)),
                 Instr::Scalar { op, dst, a, b } => {
-                    let [a, b] = [a, b].map(|reg| [cells[reg as usize], 0, 0]);
-                    cells[dst as usize] = ops::apply(op, 1, a, b, [0; 3])[0];
+                    cells[dst as usize] = ops::scalar(op, cells[a as usize], cells[b as usize]);
                 }
                 Instr::Componentwise { op, dst, a, b } => {
                     let value = ops::componentwise(op, triple(cells, a), triple(cells, b));

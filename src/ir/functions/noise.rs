@@ -57,16 +57,15 @@ impl At {
     #[inline(always)]
     fn around(&self, d: usize) -> ([u32; 2], f32) {
         let x = self.x[d];
-        // In place of `floor`, which is a call where the processor has no instruction for it. Beyond 2³¹ all is whole.
-        let whole = if x.abs() < 2_147_483_648.0 { x as i32 as f32 } else { x };
-        let floor = if whole > x { whole - 1.0 } else { whole };
-        let cells = if self.period[d] >= 1.0 {
-            [self.wrapped(floor, d), self.wrapped(floor + 1.0, d)]
-        } else {
-            let cell = floor as i64 as u32;
-            [cell, cell.wrapping_add(1)]
-        };
-        (cells, x - floor)
+        if self.period[d] >= 1.0 || x.abs() >= 2_147_483_648.0 {
+            let floor = x.floor();
+            return ([self.wrapped(floor, d), self.wrapped(floor + 1.0, d)], x - floor);
+        }
+        // `floor` is a call where the processor has no instruction for it; a conversion never is.
+        let whole = x as i32;
+        let below = i32::from(whole as f32 > x);
+        let cell = whole.wrapping_sub(below) as u32;
+        ([cell, cell.wrapping_add(1)], x - (whole as f32 - below as f32))
     }
 }
 
