@@ -6,6 +6,7 @@ use super::body::GlobalVar;
 use super::program::{Instr, Program, ShadeError};
 use crate::Globals;
 use crate::closure::ClosureTree;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A tree and what changes in it.
@@ -24,16 +25,18 @@ impl Kept {
         static LAST: AtomicU64 = AtomicU64::new(0);
         let mut tree = ClosureTree::new();
         program.run(&Globals::default(), &mut tree)?;
-        let held = |reg: u32| {
-            program.code.iter().find_map(|instr| match *instr {
-                Instr::Global { global, dst } if dst == reg => Some(global),
+        let held: HashMap<u32, GlobalVar> = program
+            .code
+            .iter()
+            .filter_map(|instr| match *instr {
+                Instr::Global { global, dst } => Some((dst, global)),
                 _ => None,
             })
-        };
+            .collect();
         let of_site: Vec<Vec<(u32, GlobalVar)>> = program
             .makers
             .iter()
-            .map(|maker| maker.open.iter().filter_map(|(slot, reg)| Some((*slot, held(*reg)?))).collect())
+            .map(|maker| maker.open.iter().filter_map(|(slot, reg)| Some((*slot, *held.get(reg)?))).collect())
             .collect();
         let directions = tree
             .lobe_slots()
