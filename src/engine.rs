@@ -8,6 +8,7 @@ use crate::Globals;
 use crate::albedo::Precision;
 use crate::closure::balance::Construction;
 use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
+use crate::closure::flatten::flatten_into;
 use crate::diag::{Diagnostic, render_all};
 use crate::ir::{self, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
 use crate::lobes;
@@ -361,7 +362,13 @@ impl Material {
         let mut tree = ClosureTree::new();
         self.inner.program.shade(&globals, &mut tree)?;
         let tables = Tables { curves: &tables.curves, balance: tables.balance.as_ref() };
-        Ok(flatten(&tree, &globals, wo, self.inner.engine.layering, tables)?)
+        tree.within_budget()?;
+        // Likewise.
+        let mut shaded = Ok(Bsdf::black());
+        if let Ok(bsdf) = &mut shaded {
+            flatten_into(bsdf, &tree, &globals, wo, self.inner.engine.layering, tables);
+        }
+        shaded
     }
 
     fn reference_tables(&self) -> &Baked<f64> {

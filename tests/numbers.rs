@@ -34,6 +34,42 @@ fn exp_and_ln_are_within_two_ulps() {
 }
 
 #[test]
+fn powers_of_two_their_logarithms_and_ln_1p() {
+    let (mut worst_power, mut worst_log, mut worst_1p) = (0.0f64, 0.0f64, 0.0f64);
+    for x in spread() {
+        let log = (x as f64).log2();
+        worst_log = worst_log.max((elementary::log2(x) as f64 - log).abs() / log.abs().max(0.05));
+        let u = elementary::ln_1p(x) as f64;
+        worst_1p = worst_1p.max((u / (x as f64).ln_1p() - 1.0).abs());
+        for x in [x, -x] {
+            if x > -126.0 && x < 127.9 {
+                let error = (elementary::exp2(x) as f64 / (x as f64).exp2() - 1.0).abs();
+                worst_power = worst_power.max(error / (1.0 + x.abs() as f64));
+            }
+        }
+    }
+    println!("exp2 {worst_power:.2e}, log2 {worst_log:.2e}, ln_1p {worst_1p:.2e}");
+    assert!(worst_power < 2e-7 && worst_log < 3e-7 && worst_1p < 3e-7, "{worst_power} {worst_log} {worst_1p}");
+    assert_eq!([0.0, 1.0, -126.0].map(elementary::exp2), [1.0, 2.0, f32::MIN_POSITIVE]);
+    assert_eq!([-126.1, f32::NEG_INFINITY].map(elementary::exp2), [0.0; 2]);
+    assert_eq!([128.0, f32::INFINITY].map(elementary::exp2), [f32::INFINITY; 2]);
+    assert!(elementary::exp2(f32::NAN).is_nan());
+    assert_eq!([1.0, 8.0, 0.0, -1.0, 1e-45].map(elementary::log2), [0.0, 3.0, -126.0, -126.0, -126.0]);
+    assert_eq!([0.0, f32::INFINITY].map(elementary::ln_1p), [0.0, f32::INFINITY]);
+}
+
+#[test]
+fn floors_and_indices() {
+    for x in spread().flat_map(|x| [x, -x]).chain([0.0, 0.5, -0.5, 1e9, -1e9, f32::INFINITY]) {
+        assert_eq!(elementary::floor(x), x.floor(), "{x}");
+    }
+    assert!(elementary::floor(f32::NAN).is_nan());
+    for i in [0, 1, 77, 4095, 4_194_304, 8_388_607] {
+        assert_eq!(elementary::index(i as f32), i);
+    }
+}
+
+#[test]
 fn exp_and_ln_at_the_edges() {
     assert_eq!(elementary::exp(-200.0), 0.0);
     assert_eq!(elementary::exp(f32::NEG_INFINITY), 0.0);
@@ -75,13 +111,15 @@ fn lanes_and_scalars_share_every_function() {
     let xs: Vec<f32> = spread().step_by(7).flat_map(|x| [x, -x]).chain([0.0, -0.0, f32::INFINITY, f32::NAN]).collect();
     for chunk in xs.chunks_exact(8) {
         let lanes = F32x8(chunk.try_into().unwrap());
-        let pairs: [Pair; 6] = [
+        let pairs: [Pair; 8] = [
             (lanes.exp(), Real::exp),
             (lanes.ln(), Real::ln),
             (lanes.abs().sqrt(), |x| x.abs().sqrt()),
             (lanes.sin_cos().0, |x| Real::sin_cos(x).0),
             (lanes.atan2(F32x8::c(0.5)), |x| Real::atan2(x, 0.5)),
             (lanes.powf(F32x8::c(0.3)), |x| Real::powf(x, 0.3)),
+            (lanes.abs().ln_1p(), |x| Real::ln_1p(x.abs())),
+            (lanes.floor(), Real::floor),
         ];
         for (wide, narrow) in pairs {
             for i in 0..8 {

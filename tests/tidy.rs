@@ -120,8 +120,13 @@ fn files_stay_readable() {
 }
 
 #[test]
-fn unsafe_code_stands_nowhere() {
+fn unsafe_code_stands_in_the_dispatch_to_vector_code_alone() {
     for (file, code) in library() {
+        if file == "optics/dispatch.rs" {
+            let blocks = code.matches("unsafe {").count();
+            assert!(blocks == code.matches("// SAFETY:").count(), "src/{file}: an unsafe block without its reason");
+            continue;
+        }
         let attribute_free = code.replace("unsafe_code", "");
         assert!(!attribute_free.contains("unsafe"), "src/{file}");
     }

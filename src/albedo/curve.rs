@@ -153,6 +153,12 @@ impl<S: Real> AlbedoCurve<S> {
         self.read(&self.excess, w.z, parameter).max(L::one())
     }
 
+    /// Whether [`excess`](Self::excess) is above 1 anywhere.
+    #[inline(always)]
+    pub fn divides(&self) -> bool {
+        !self.excess.is_empty()
+    }
+
     /// What the lobe asked for beside its albedos; empty if it asked for nothing.
     #[inline(always)]
     pub fn extra(&self) -> &[S] {

@@ -7,6 +7,7 @@
 use super::cubature::{Tolerance, integrate, integrate_until};
 use super::{Subject, dot};
 use crate::closure::Bsdf;
+use crate::closure::bsdf::Cosine;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{LobeKind, Rgb};
 use crate::optics::{Frame, Scalar, V3};
@@ -65,8 +66,8 @@ pub fn albedo_until<'m, S: Scalar>(
         let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
         let (moving, weight) = charts[index].direction(x, y);
         let part = match side {
-            Side::View => held.part(moving, false, pick),
-            Side::Light => subject.bsdf([moving.x, moving.y, moving.z]).part(vector(w), true, pick),
+            Side::View => held.part(moving, Cosine::Light, pick),
+            Side::Light => subject.bsdf([moving.x, moving.y, moving.z]).part(vector(w), Cosine::View, pick),
         };
         part.map(|x| x.to_f64() * weight)
     };

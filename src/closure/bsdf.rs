@@ -8,8 +8,8 @@ use super::flatten::Layering;
 use super::layer::{LayerStack, LayeringRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
-use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3};
+use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
+use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch, frame};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -105,7 +105,7 @@ pub struct Bsdf<'m, S: Real = f32> {
 
 /// Which cosine multiplies f.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cosine {
+pub(crate) enum Cosine {
     /// |N·ωi|: light arriving from ωi, seen from ωo.
     Light,
     /// |N·ωo|: the adjoint.
@@ -115,12 +115,14 @@ enum Cosine {
 }
 
 impl<'m, S: Scalar> Bsdf<'m, S> {
-    pub(crate) fn empty(wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) -> Self {
+    /// A BSDF that scatters nothing.
+    pub fn black() -> Self {
+        let zero = V3::new(S::zero(), S::zero(), S::zero());
         Bsdf {
-            wo,
-            ng,
-            layering,
-            depth,
+            wo: zero,
+            ng: zero,
+            layering: Layering::default(),
+            depth: 0,
             ops: SmallVec::new(),
             lobes: SmallVec::new(),
             layers: SmallVec::new(),
@@ -129,10 +131,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
-    /// A BSDF that scatters nothing.
-    pub fn black() -> Self {
-        let zero = V3::new(S::zero(), S::zero(), S::zero());
-        Bsdf::empty(zero, zero, Layering::default(), 0)
+    /// Makes a black BSDF ready to be filled; `wo` and `ng` of any length.
+    pub(crate) fn begin(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
+        self.wo = frame::normalize(wo).unwrap_or(self.wo);
+        self.ng = frame::normalize(ng).unwrap_or(self.ng);
+        self.layering = layering;
+        self.depth = depth;
     }
 
     /// Turns estimated albedos into probabilities and drops nothing.
@@ -156,32 +160,18 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// `wi`: world space, unit, away from the surface. A direction that is not finite, or shorter than ½ or longer than
     /// 2, gives black and pdf 0.
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
-        let mut pdf = S::zero();
-        let f_cos = self.sum(vector(wi.into()), Cosine::Light, |l, local| {
-            pdf = l.probability.mul_add(l.lobe.pdf(local), pdf);
-        });
-        Eval { f_cos, pdf }
-    }
-
-    /// [`eval`](Self::eval) of many directions at once, eight at a time. Gives bit for bit what `eval` gives.
-    ///
-    /// # Panics
-    /// If `out` is shorter than `wi`.
-    pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval])
-    where
-        F32x8: Lift<S>,
-    {
-        assert!(out.len() >= wi.len(), "{} results for {} directions", out.len(), wi.len());
-        for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
-            let lane = |c: usize| F32x8(std::array::from_fn(|i| wi.get(i).map_or(0.0, |w| w[c])));
-            let mut pdf = F32x8::zero();
-            let f_cos = self.sum(V3::new(lane(0), lane(1), lane(2)), Cosine::Light, |l, local| {
-                pdf = F32x8::lift(l.probability).mul_add(l.lobe.pdf(local), pdf);
-            });
-            for i in 0..wi.len() {
-                out[i] = Eval { f_cos: f_cos.map(|f| f.0[i]), pdf: pdf.0[i] };
-            }
-        }
+        let mut sum = Eval { f_cos: [S::zero(); 3], pdf: S::zero() };
+        self.walk(
+            vector(wi.into()),
+            false,
+            |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+                let e = l.lobe.evaluate(local, l.curve, bound);
+                sum.add(l, scale, local.z, &e);
+                e.bound
+            },
+        );
+        sum.f_cos = sum.f_cos.map(finite);
+        sum
     }
 
     /// Memory in use: the parts a walk touches, not the room kept for more lobes.
@@ -197,12 +187,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi|: what E_light integrates over ωo.
     pub fn eval_adjoint(&self, wi: [S; 3]) -> Rgb<S> {
-        self.sum(vector(wi), Cosine::View, |_, _| {})
+        self.part(vector(wi), Cosine::View, |_, _| true)
     }
 
     /// Σ w·f without cosines: symmetric in its directions if the BSDF is reciprocal.
     pub fn f(&self, wi: [S; 3]) -> Rgb<S> {
-        self.sum(vector(wi), Cosine::None, |_, _| {})
+        self.part(vector(wi), Cosine::None, |_, _| true)
     }
 
     /// Draws a direction from three uniform numbers in [0, 1): two for the direction, one to choose the lobe.
@@ -282,9 +272,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// Never below ∫ f·|cos| over the other direction when one direction is `w`, from either side.
     pub fn albedo_bound(&self, w: [S; 3]) -> Rgb<S> {
-        let mut bound = [S::zero(); 3];
-        self.walk(vector(w), true, |_, _, _, _| {}, |b| bound = b);
-        bound
+        self.walk(vector(w), true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
     }
 
     /// What the delta lobes scatter, exactly: the part of the albedo that `eval` leaves out.
@@ -312,12 +300,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             self.walk(
                 wi,
                 false,
-                |i, _, s, _| {
+                |i, l: &FlatLobe<'m, S>, s: Rgb<S>, local: V3<S>, bound| {
                     if i == index {
                         scale = s
                     }
+                    l.bound(local, bound)
                 },
-                |_| {},
             );
         }
         Some(std::array::from_fn(|c| l.weight[c] * scale[c] * part[c]))
@@ -329,35 +317,34 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         self.walk(
             wi,
             false,
-            |i, l, scale, local| {
+            |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
                 if i == index {
                     let scale = if layered { scale } else { [S::one(); 3] };
                     result = weighted(l, scale, local, Cosine::Light);
                 }
+                l.bound(local, bound)
             },
-            |_| {},
         );
         result
     }
 
-    /// Like `eval` (or `eval_adjoint`) with only the lobes whose frame and kind `pick` accepts.
-    pub(crate) fn part(&self, wi: V3<S>, adjoint: bool, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
-        let cosine = if adjoint { Cosine::View } else { Cosine::Light };
+    /// Like `eval`, its cosine chosen, with only the lobes whose frame and kind `pick` accepts.
+    pub(crate) fn part(&self, wi: V3<S>, cosine: Cosine, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
         let mut sum = [S::zero(); 3];
         self.walk(
             wi,
             false,
-            |_, l, scale, local| {
+            |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
                 if pick(&self.frames[l.frame as usize], l.kind) {
                     let part = weighted(l, scale, local, cosine);
                     for c in 0..3 {
                         sum[c] += part[c];
                     }
                 }
+                l.bound(local, bound)
             },
-            |_| {},
         );
-        sum
+        sum.map(finite)
     }
 
     /// The frames in use, one per distinct normal and tangent.
@@ -375,53 +362,30 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         (self.lobes[index].kind, self.lobes[index].site)
     }
 
-    #[inline]
-    fn sum<L: Real + Lift<S>>(
-        &self,
-        wi: V3<L>,
-        cosine: Cosine,
-        mut each: impl FnMut(&FlatLobe<'m, S>, V3<L>),
-    ) -> Rgb<L> {
-        let mut sum = [L::zero(); 3];
-        self.walk(
-            wi,
-            false,
-            |_, l, scale, local| {
-                let part = weighted(l, scale, local, cosine);
-                for c in 0..3 {
-                    sum[c] += part[c];
-                }
-                each(l, local);
-            },
-            |_| {},
-        );
-        // A million terms of weight 1e30 are still a number.
-        sum.map(|x| x.min(L::c(f32::MAX as f64)))
-    }
-
-    /// Visits every lobe with what the layers above it scale it by for this ωi, and the direction in its frame.
-    #[inline]
-    fn walk<L: Real + Lift<S>>(
-        &self,
-        wi: V3<L>,
-        bound: bool,
-        visit: impl FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>),
-        done: impl FnOnce(Rgb<L>),
-    ) {
+    /// Visits every lobe, then gives the bound on the whole if it is asked for.
+    #[inline(always)]
+    fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
         match self.depth {
-            0..=4 => self.walk_within::<L, 4>(wi, bound, visit, done),
-            _ => self.walk_within::<L, { MAX_LAYERS as usize }>(wi, bound, visit, done),
+            0..=1 => self.walk_within::<S, 1>(wi, bound, visit),
+            2..=4 => self.walk_within::<S, 4>(wi, bound, visit),
+            _ => self.walk_deep(wi, bound, visit),
         }
     }
 
-    #[inline]
+    /// Apart, because its stack is large: walks that do not need it should not make room for it.
+    #[cold]
+    #[inline(never)]
+    fn walk_deep(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
+        self.walk_within::<S, { MAX_LAYERS as usize }>(wi, bound, visit)
+    }
+
+    #[inline(always)]
     fn walk_within<L: Real + Lift<S>, const D: usize>(
         &self,
         wi: V3<L>,
         bound: bool,
-        mut visit: impl FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>),
-        done: impl FnOnce(Rgb<L>),
-    ) {
+        mut visit: impl Visit<'m, S, L>,
+    ) -> Rgb<L> {
         let wi = unit_or_zero(wi);
         let mut stack = LayerStack::<L, D>::default();
         let (mut lobe, mut layer) = (0, 0);
@@ -439,11 +403,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                         Some(balanced) => balanced.scale(local.z),
                         None => stack.scale(),
                     };
-                    visit(lobe, l, scale, local);
-                    lobe += 1;
-                    if l.in_top || bound {
-                        stack.lobe(l.weight_in_top, l.lobe.albedo_bound(local, l.curve));
+                    let asked = l.in_top || bound;
+                    let bound = visit.lobe(lobe, l, scale, local, asked);
+                    if asked {
+                        stack.lobe(l.weight_in_top, bound);
                     }
+                    lobe += 1;
                 }
                 Op::Begin => stack.begin(),
                 Op::Middle => {
@@ -454,7 +419,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                 Op::End => stack.end(),
             }
         }
-        done(stack.bound());
+        stack.bound()
     }
 
     /// Whether every layer scales symmetrically in its directions.
@@ -463,15 +428,121 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 }
 
+impl<'m> Bsdf<'m, f32> {
+    /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are.
+    ///
+    /// # Panics
+    /// If `out` is shorter than `wi`.
+    pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
+        assert!(out.len() >= wi.len(), "{} results for {} directions", out.len(), wi.len());
+        if usize::from(self.depth) <= DEPTH_IN_LANES {
+            dispatch::widest(Batch { bsdf: self, wi, out });
+        } else {
+            out.iter_mut().zip(wi).for_each(|(out, wi)| *out = self.eval(*wi));
+        }
+    }
+}
+
+/// Is shown every lobe: its index, what the layers above it scale it by for this ωi, the direction in its frame, and
+/// whether its bound there is asked for, which is then to be returned.
+trait Visit<'m, S: Real, L> {
+    fn lobe(&mut self, index: usize, lobe: &FlatLobe<'m, S>, scale: Rgb<L>, local: V3<L>, bound: bool) -> Rgb<L>;
+}
+
+impl<'m, S: Real, L, F: FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>, bool) -> Rgb<L>> Visit<'m, S, L> for F {
+    #[inline(always)]
+    fn lobe(&mut self, index: usize, lobe: &FlatLobe<'m, S>, scale: Rgb<L>, local: V3<L>, bound: bool) -> Rgb<L> {
+        self(index, lobe, scale, local, bound)
+    }
+}
+
+/// Adds up lanes; no closure, because those cannot be told to be inlined.
+impl<'m> Visit<'m, f32, F32x8> for &mut Eval<F32x8> {
+    #[inline(always)]
+    fn lobe(
+        &mut self,
+        _: usize,
+        l: &FlatLobe<'m, f32>,
+        scale: Rgb<F32x8>,
+        local: V3<F32x8>,
+        bound: bool,
+    ) -> Rgb<F32x8> {
+        let e = l.lobe.evaluate_lanes(&local, l.curve, bound);
+        self.add(l, scale, local.z, &e);
+        e.bound
+    }
+}
+
+/// How many layers may be open at once for directions to be worked on side by side.
+const DEPTH_IN_LANES: usize = 4;
+
+/// The work of [`Bsdf::eval_batch`], compiled for each instruction set that is chosen from at run time.
+struct Batch<'a, 'm> {
+    bsdf: &'a Bsdf<'m>,
+    wi: &'a [[f32; 3]],
+    out: &'a mut [Eval],
+}
+
+impl dispatch::Work for Batch<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Batch { bsdf, wi, out } = self;
+        for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
+            let mut block = [[0.0; F32x8::LANES]; 3];
+            for (i, w) in wi.iter().enumerate() {
+                for c in 0..3 {
+                    block[c][i] = w[c];
+                }
+            }
+            let [x, y, z] = block.map(F32x8);
+            let mut sum = Eval { f_cos: [F32x8::zero(); 3], pdf: F32x8::zero() };
+            bsdf.walk_within::<F32x8, DEPTH_IN_LANES>(V3::new(x, y, z), false, &mut sum);
+            sum.f_cos = sum.f_cos.map(finite);
+            for i in 0..wi.len() {
+                out[i] = Eval { f_cos: sum.f_cos.map(|f| f.0[i]), pdf: sum.pdf.0[i] };
+            }
+        }
+    }
+}
+
+impl<L: Real> Eval<L> {
+    /// Adds one lobe, scaled by what lies above it.
+    #[inline(always)]
+    fn add<S: Scalar>(&mut self, l: &FlatLobe<'_, S>, scale: Rgb<L>, cos: L, e: &Evaluated<L>)
+    where
+        L: Lift<S>,
+    {
+        let cos = cos.abs().min(L::one());
+        for c in 0..3 {
+            self.f_cos[c] += L::lift(l.weight[c]) * scale[c] * e.f[c] * cos;
+        }
+        self.pdf = L::lift(l.probability).mul_add(e.pdf, self.pdf);
+    }
+}
+
+impl<S: Scalar> FlatLobe<'_, S> {
+    /// The bound at a direction, if it is asked for.
+    fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
+        if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }
+    }
+}
+
+/// A million terms of weight 1e30 are still a number.
 #[inline(always)]
-fn weighted<S: Scalar, L: Real + Lift<S>>(l: &FlatLobe<'_, S>, scale: Rgb<L>, local: V3<L>, cosine: Cosine) -> Rgb<L> {
+fn finite<L: Real>(x: L) -> L {
+    x.min(L::c(f32::MAX as f64))
+}
+
+fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine) -> Rgb<S> {
     let f = l.lobe.f(local, l.curve);
     let cos = match cosine {
-        Cosine::Light => local.z.abs().min(L::one()),
-        Cosine::View => L::lift(l.cos_o),
-        Cosine::None => L::one(),
+        Cosine::Light => local.z.abs().min(S::one()),
+        Cosine::View => l.cos_o,
+        Cosine::None => S::one(),
     };
-    std::array::from_fn(|c| L::lift(l.weight[c]) * scale[c] * f[c] * cos)
+    std::array::from_fn(|c| l.weight[c] * scale[c] * f[c] * cos)
 }
 
 /// Directions that are not finite, or far from unit length, become zero: in every surface at once, hence black.

@@ -12,7 +12,7 @@ use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{Scalar, V3, frame};
+use crate::optics::{Scalar, V3};
 use glam::Vec3;
 use smallvec::SmallVec;
 
@@ -101,18 +101,42 @@ pub fn flatten<'m, S: Scalar>(
     tables: impl Into<Tables<'m, S>>,
 ) -> Result<Bsdf<'m, S>, TreeError> {
     tree.within_budget()?;
+    // Written where the caller has room for it: a BSDF with room for eight lobes is too large to pass around.
+    let mut flat = Ok(Bsdf::black());
+    if let Ok(bsdf) = &mut flat {
+        flatten_into(bsdf, tree, globals, wo, layering, tables.into());
+    }
+    flat
+}
+
+/// [`flatten`] of a tree within its budget, into a black BSDF.
+pub(crate) fn flatten_into<'m, S: Scalar>(
+    bsdf: &mut Bsdf<'m, S>,
+    tree: &ClosureTree,
+    globals: &Globals,
+    wo: V3<S>,
+    layering: Layering,
+    tables: Tables<'m, S>,
+) {
     let layers = tree.size(tree.root()).layers;
-    let zero = V3::new(S::zero(), S::zero(), S::zero());
-    let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
-    // Written in place: a BSDF with room for eight lobes is too large to pass around.
-    let mut bsdf = Bsdf::empty(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
-    let tables = tables.into();
+    bsdf.begin(wo, V3::from_f32(globals.ng.to_array()), layering, layers);
     match layers {
-        0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, &mut bsdf)),
-        _ => walk(tree, &mut Flattener::<S, { MAX_LAYERS as usize }>::new(globals, tables, &mut bsdf)),
+        0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
+        _ => flatten_deep(bsdf, tree, globals, tables),
     }
     bsdf.finish();
-    Ok(bsdf)
+}
+
+/// Apart, because its stack is large.
+#[cold]
+#[inline(never)]
+fn flatten_deep<'m, S: Scalar>(
+    bsdf: &mut Bsdf<'m, S>,
+    tree: &ClosureTree,
+    globals: &Globals,
+    tables: Tables<'m, S>,
+) {
+    walk(tree, &mut Flattener::<S, { MAX_LAYERS as usize }>::new(globals, tables, bsdf));
 }
 
 struct Flattener<'b, 'm, S: Scalar, const D: usize> {

@@ -7,7 +7,7 @@
 //! The bound is what the guarantee rests on. f is divided by max(1, Ē(ωo), Ē(ωi)), so a bound above 1 is allowed; one
 //! that is too low is not found out here, but by the audits.
 
-use super::registry::{Form, LobeClass, LobeSpec, ParamSpec, ParamTy};
+use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
 use super::{LobeKind, Rgb, Rgb32};
 use crate::optics::{Lift, Real, V3, sampling};
 use std::fmt;
@@ -221,9 +221,11 @@ impl HostKind {
         if taken.into_iter().any(|f| f.name == spec.name && types(f.params) == types(&spec.params)) {
             return Err(RegisterError::Taken(spec.name));
         }
+        let params: &'static [ParamSpec] = spec.params.leak();
         let spec_of = LobeSpec {
             name: spec.name.leak(),
-            params: spec.params.leak(),
+            params,
+            layout: Layout::of(params),
             doc: spec.doc.leak(),
             source: spec.source.leak(),
             reciprocal: spec.reciprocal,

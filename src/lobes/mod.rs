@@ -29,7 +29,7 @@ pub mod transparent;
 pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{F32x8, Lift, Real, V3};
 use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
@@ -75,6 +75,16 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
+    /// [`f`](Lobe::f) for every lane, the same bits. A lobe of several variants takes its choice here, outside the loop.
+    #[inline(always)]
+    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        over_lanes(wi, |w| self.f::<f32>(w, curve))
+    }
+
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L;
 
@@ -110,6 +120,46 @@ pub trait Lobe<S: Real>: Sized + Copy {
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
     }
+}
+
+/// All that an evaluation asks of a lobe for one direction, or for several side by side.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluated<L> {
+    /// See [`Lobe::f`].
+    pub f: Rgb<L>,
+    /// See [`Lobe::pdf`].
+    pub pdf: L,
+    /// See [`Lobe::albedo_bound`]; 0 if it was not asked for.
+    pub bound: Rgb<L>,
+}
+
+#[inline(always)]
+fn evaluate<S: Real>(lobe: &impl Lobe<S>, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+    let bound = if bound { lobe.albedo_bound(wi, curve) } else { [S::zero(); 3] };
+    Evaluated { f: lobe.f(wi, curve), pdf: lobe.pdf(wi), bound }
+}
+
+/// Long formulas as loops over the lanes, which the compiler makes vector code of; what only reads a table as it is.
+#[inline(always)]
+fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
+    let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
+    let [pdf, ..] = over_lanes(wi, |w| [lobe.pdf(w); 3]);
+    Evaluated { f: lobe.f_lanes(wi, curve), pdf, bound }
+}
+
+/// `f` of every lane.
+#[inline(always)]
+pub(crate) fn over_lanes(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> Rgb<f32>) -> Rgb<F32x8> {
+    // What the loop reads and writes is local, so that nothing it writes can be something it reads.
+    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
+    let mut out = [[0.0; F32x8::LANES]; 3];
+    for i in 0..F32x8::LANES {
+        let value = f(V3::new(x[i], y[i], z[i]));
+        for c in 0..3 {
+            out[c][i] = value[c];
+        }
+    }
+    out.map(F32x8)
 }
 
 macro_rules! lobes {
@@ -190,6 +240,17 @@ macro_rules! lobes {
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
             }
+            /// What evaluating a BSDF needs of a lobe, in one call.
+            #[inline(always)]
+            pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+                match self {
+                    $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
+                    AnyLobe::Host(l) => {
+                        let bound = if bound { l.albedo_bound(wi) } else { [S::zero(); 3] };
+                        Evaluated { f: l.f(wi), pdf: l.pdf(wi), bound }
+                    }
+                }
+            }
             /// See [`Lobe::f`].
             #[inline]
             pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
@@ -223,6 +284,22 @@ macro_rules! lobes {
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
                 match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
+            }
+        }
+
+        impl AnyLobe<f32> {
+            /// [`evaluate`](Self::evaluate) for lanes side by side, the same bits.
+            #[inline(always)]
+            pub fn evaluate_lanes(
+                &self,
+                wi: &V3<F32x8>,
+                curve: &AlbedoCurve<f32>,
+                bound: bool,
+            ) -> Evaluated<F32x8> {
+                match *self {
+                    $( AnyLobe::$Lobe(l) => evaluate_lanes(&l, wi, curve, bound), )*
+                    AnyLobe::Host(l) => Evaluated { f: l.f(*wi), pdf: l.pdf(*wi), bound: l.albedo_bound(*wi) },
+                }
             }
         }
     };

@@ -113,39 +113,53 @@ pub struct LobeSpec {
     pub reciprocal: bool,
     /// How it takes part in a BSDF.
     pub class: LobeClass,
+    /// What its parameter block looks like.
+    pub layout: Layout,
+}
+
+/// A parameter block at a glance; follows from the parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    slots: usize,
+    normal: Option<usize>,
+    tangent: Option<usize>,
+}
+
+impl Layout {
+    /// The layout of a block of `params`.
+    pub const fn of(params: &[ParamSpec]) -> Layout {
+        let mut layout = Layout { slots: 0, normal: None, tangent: None };
+        let mut i = 0;
+        while i < params.len() {
+            match params[i].ty {
+                ParamTy::Normal if layout.normal.is_none() => layout.normal = Some(layout.slots),
+                ParamTy::Vector if layout.tangent.is_none() => layout.tangent = Some(layout.slots),
+                _ => {}
+            }
+            layout.slots += params[i].ty.slots();
+            i += 1;
+        }
+        layout
+    }
 }
 
 impl LobeSpec {
     /// Number of f32 slots of a parameter block.
+    #[inline(always)]
     pub const fn slot_count(&self) -> usize {
-        let (mut slots, mut i) = (0, 0);
-        while i < self.params.len() {
-            slots += self.params[i].ty.slots();
-            i += 1;
-        }
-        slots
+        self.layout.slots
     }
 
     /// Where the lobe's own shading normal starts in its block: its first `normal` parameter.
+    #[inline(always)]
     pub const fn normal_slot(&self) -> Option<usize> {
-        self.first_slot(ParamTy::Normal)
+        self.layout.normal
     }
 
     /// Where the lobe's tangent starts in its block: its first `vector` parameter.
+    #[inline(always)]
     pub const fn tangent_slot(&self) -> Option<usize> {
-        self.first_slot(ParamTy::Vector)
-    }
-
-    const fn first_slot(&self, ty: ParamTy) -> Option<usize> {
-        let (mut at, mut i) = (0, 0);
-        while i < self.params.len() {
-            if self.params[i].ty as u8 == ty as u8 {
-                return Some(at);
-            }
-            at += self.params[i].ty.slots();
-            i += 1;
-        }
-        None
+        self.layout.tangent
     }
 
     /// The first slot of the parameter called `name`.
@@ -305,9 +319,8 @@ macro_rules! closure {
         pub struct $Params { $( $(#[doc = $pdoc])* pub $p: $crate::lobes::registry::rust_type!($ty), )* }
 
         impl $crate::lobes::registry::ClosureParams for $Params {
-            const SPEC: &'static $crate::lobes::registry::LobeSpec = &$crate::lobes::registry::LobeSpec {
-                name: $name,
-                params: &[ $( $crate::lobes::registry::ParamSpec {
+            const SPEC: &'static $crate::lobes::registry::LobeSpec = {
+                const PARAMS: &[$crate::lobes::registry::ParamSpec] = &[ $( $crate::lobes::registry::ParamSpec {
                     name: stringify!($p),
                     ty: $crate::lobes::registry::param_ty!($ty),
                     keyword: $crate::lobes::registry::is_keyword!($($kw)?),
@@ -316,11 +329,16 @@ macro_rules! closure {
                     max: $crate::lobes::registry::or_else!($($hi)?, f32::INFINITY),
                     options: &[$($($opt),*)?],
                     doc: concat!($($pdoc, "\n"),*),
-                } ),* ],
-                doc: concat!($($doc, "\n"),*),
-                source: $source,
-                reciprocal: $rec,
-                class: $crate::lobes::registry::LobeClass::$class,
+                } ),* ];
+                &$crate::lobes::registry::LobeSpec {
+                    name: $name,
+                    params: PARAMS,
+                    doc: concat!($($doc, "\n"),*),
+                    source: $source,
+                    reciprocal: $rec,
+                    class: $crate::lobes::registry::LobeClass::$class,
+                    layout: $crate::lobes::registry::Layout::of(PARAMS),
+                }
             };
 
             #[allow(unused_assignments, unused_variables, unused_mut, non_snake_case)]

@@ -29,9 +29,9 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb};
+use super::{Lobe, LobeKind, Rgb, over_lanes};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{F32x8, Lift, Real, V3};
 
 closure! {
     /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
@@ -170,16 +170,22 @@ impl Variant {
     }
 }
 
+/// Shadowing by the fitted Λ.
+#[derive(Clone, Copy, Debug)]
+struct FittedFor<S> {
+    fit: FittedLambda<S>,
+    /// 1 + Λ(ωo).
+    lambda_o: S,
+    /// 1/(4·μo).
+    scale: S,
+    /// 2 with softening and 0 without.
+    soften: S,
+}
+
 /// How fibres hide each other, prepared for ωo.
 #[derive(Clone, Copy, Debug)]
 enum Shadowing<S> {
-    /// 1 + Λ(ωo); 1/(4·μo); 2 with softening and 0 without.
-    Fitted {
-        fit: FittedLambda<S>,
-        lambda_o: S,
-        scale: S,
-        soften: S,
-    },
+    Fitted(FittedFor<S>),
     /// μo·Λ(ωo).
     Exact {
         exact: ExactLambda<S>,
@@ -214,7 +220,7 @@ impl<S: Real> Sheen<S> {
         let fitted = |fit: FittedLambda<S>, soften: f64| {
             let cos = wo.z.clamp(S::c(MIN_COS), S::one());
             let lambda_o = S::one() + fit.ln_lambda(cos).exp();
-            Shadowing::Fitted { fit, lambda_o, scale: S::c(0.25) / cos, soften: S::c(soften) }
+            Shadowing::Fitted(FittedFor { fit, lambda_o, scale: S::c(0.25) / cos, soften: S::c(soften) })
         };
         let shadowing = match variant {
             Softened => fitted(FittedLambda::published(r), 2.0),
@@ -238,27 +244,64 @@ impl<S: Real> Sheen<S> {
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
     fn value<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
-        let wo = V3::<L>::lift(self.wo);
-        let d = self.fibres.d(charlie::half_cot2(wo, wi));
-        let f = match self.shadowing {
-            Shadowing::Fitted { fit, lambda_o, scale, soften } => {
-                let cos = wi.z.clamp(L::c(MIN_COS), L::one());
-                // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
-                let grazing = (L::one() - cos).sq().sq().sq();
-                let softened = L::lift(soften).mul_add(grazing, L::one());
-                let lambda_i = (fit.ln_lambda(cos) * softened).exp();
-                d * L::lift(scale) / (cos * (L::lift(lambda_o) + lambda_i))
-            }
-            Shadowing::Exact { exact, cos_lambda_o } => {
-                // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
-                let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
-                let sum = wo.z * (wi.z + cos_lambda_i) + wi.z * L::lift(cos_lambda_o);
-                d * L::c(0.25) / sum.max(L::c(1e-30))
-            }
-            Shadowing::Visibility => d * visibility(wo.z, wi.z),
-            Shadowing::Transformed { albedo } => L::lift(albedo) * self.ltc.density_over_cos(wi),
-        };
-        L::select(wo.z.gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
+        match self.shadowing {
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
+            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, terms),
+            Shadowing::Visibility => self.visible(wi),
+            Shadowing::Transformed { albedo } => self.transformed(albedo, wi),
+        }
+    }
+
+    /// D over ωo and ωi.
+    #[inline(always)]
+    fn d<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        self.fibres.d(charlie::half_cot2(V3::<L>::lift(self.wo), wi))
+    }
+
+    /// `f` where both directions lie above the surface, else 0.
+    #[inline(always)]
+    fn above<L: Real + Lift<S>>(&self, wi: V3<L>, f: L) -> L {
+        L::select(L::lift(self.wo.z).gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
+    }
+
+    #[inline(always)]
+    fn fitted<L: Real + Lift<S>>(&self, FittedFor { fit, lambda_o, scale, soften }: FittedFor<S>, wi: V3<L>) -> L {
+        let cos = wi.z.clamp(L::c(MIN_COS), L::one());
+        // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
+        let grazing = (L::one() - cos).sq().sq().sq();
+        let softened = L::lift(soften).mul_add(grazing, L::one());
+        let lambda_i = (fit.ln_lambda(cos) * softened).exp();
+        self.above(wi, self.d(wi) * L::lift(scale) / (cos * (L::lift(lambda_o) + lambda_i)))
+    }
+
+    #[inline(always)]
+    fn exact<L: Real + Lift<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, terms: &[S]) -> L {
+        // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
+        let cos_o = L::lift(self.wo.z);
+        let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
+        let sum = cos_o * (wi.z + cos_lambda_i) + wi.z * L::lift(cos_lambda_o);
+        self.above(wi, self.d(wi) * L::c(0.25) / sum.max(L::c(1e-30)))
+    }
+
+    #[inline(always)]
+    fn visible<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        self.above(wi, self.d(wi) * visibility(L::lift(self.wo.z), wi.z))
+    }
+
+    #[inline(always)]
+    fn transformed<L: Real + Lift<S>>(&self, albedo: S, wi: V3<L>) -> L {
+        self.above(wi, L::lift(albedo) * self.ltc.density_over_cos(wi))
+    }
+
+    /// A value divided by what the lobe would gain at either direction.
+    #[inline(always)]
+    fn kept<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>, value: L) -> Rgb<L> {
+        if curve.divides() {
+            let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
+            [value / excess; 3]
+        } else {
+            [value; 3]
+        }
     }
 
     /// What [`CurveSpec`] integrates: key = [roughness, variants], the largest f of the variants whose bit is set.
@@ -356,8 +399,24 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
-        [self.value(wi, curve.extra()) / excess; 3]
+        self.kept(wi, curve, self.value(wi, curve.extra()))
+    }
+
+    #[inline(always)]
+    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        let [value, ..] = match self.shadowing {
+            Shadowing::Fitted(fitted) => over_lanes(wi, |w| [self.fitted(fitted, w); 3]),
+            Shadowing::Exact { exact, cos_lambda_o } => {
+                over_lanes(wi, |w| [self.exact(exact, cos_lambda_o, w, curve.extra()); 3])
+            }
+            Shadowing::Visibility => over_lanes(wi, |w| [self.visible(w); 3]),
+            Shadowing::Transformed { albedo } => over_lanes(wi, |w| [self.transformed(albedo, w); 3]),
+        };
+        self.kept(*wi, curve, value)
     }
 
     #[inline(always)]

@@ -39,6 +39,17 @@ impl<S: Scalar> Frame<S> {
 
 /// The unit vector along `v`; `None` if `v` is zero or not finite. Safe for lengths whose square over- or underflows.
 pub fn normalize<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
+    let square = v.length_squared();
+    if is_ordinary(square) { Some(v.scale(S::one() / square.sqrt())) } else { normalize_extreme(v) }
+}
+
+/// Whether a squared length is far from where squares over- or underflow; never for NaN.
+fn is_ordinary<S: Scalar>(square: S) -> bool {
+    square.gt(S::c(1e-20)) & square.lt(S::c(1e20))
+}
+
+#[cold]
+fn normalize_extreme<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
     let largest = v.x.abs().max(v.y.abs()).max(v.z.abs());
     let finite = v.x.is_finite() && v.y.is_finite() && v.z.is_finite();
     if !finite || largest.le(S::zero()) {
@@ -51,6 +62,12 @@ pub fn normalize<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
 
 /// The part of `along` perpendicular to the unit vector `n`, normalised; `None` if less than 1e-6 of it is left.
 fn tangent<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
+    let t = along - n.scale(n.dot(along));
+    let (square, whole) = (t.length_squared(), along.length_squared());
+    // Half or more is left: nothing has cancelled.
+    if is_ordinary(whole) && square.gt(whole * S::c(0.25)) {
+        return Some(t.scale(S::one() / square.sqrt()));
+    }
     let a = normalize(along)?;
     let t = a - n.scale(n.dot(a));
     if t.length_squared().lt(S::c(1e-12)) {

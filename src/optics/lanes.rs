@@ -35,10 +35,6 @@ macro_rules! shared_scalar {
             <$t>::sqrt(self)
         }
         #[inline(always)]
-        fn floor(self) -> Self {
-            <$t>::floor(self)
-        }
-        #[inline(always)]
         fn lt(self, o: Self) -> bool {
             self < o
         }
@@ -49,10 +45,6 @@ macro_rules! shared_scalar {
         #[inline(always)]
         fn select(mask: bool, a: Self, b: Self) -> Self {
             if mask { a } else { b }
-        }
-        #[inline(always)]
-        fn pick(table: &[f32], index: Self) -> Self {
-            table[index as usize] as $t
         }
     };
 }
@@ -70,6 +62,12 @@ impl Real for f64 {
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {
         self * a + o * b
+    }
+    fn floor(self) -> Self {
+        f64::floor(self)
+    }
+    fn pick(table: &[f32], index: Self) -> Self {
+        f64::from(table[index as usize])
     }
     fn exp(self) -> Self {
         f64::exp(self)
@@ -101,12 +99,28 @@ impl Real for f32 {
         (f64::from(self) * a + f64::from(o) * b) as f32
     }
     #[inline(always)]
+    fn floor(self) -> Self {
+        elementary::floor(self)
+    }
+    #[inline(always)]
+    fn pick(table: &[f32], index: Self) -> Self {
+        <f32 as Lift<f32>>::gather(table, index)
+    }
+    #[inline(always)]
     fn exp(self) -> Self {
         elementary::exp(self)
     }
     #[inline(always)]
     fn ln(self) -> Self {
         elementary::ln(self)
+    }
+    #[inline(always)]
+    fn ln_1p(self) -> Self {
+        elementary::ln_1p(self)
+    }
+    #[inline(always)]
+    fn powf(self, y: Self) -> Self {
+        elementary::exp2(y * elementary::log2(self))
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
@@ -256,7 +270,7 @@ impl Real for F32x8 {
     }
     #[inline(always)]
     fn floor(self) -> Self {
-        self.map(f32::floor)
+        self.map(elementary::floor)
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
@@ -283,6 +297,14 @@ impl Real for F32x8 {
         self.map(elementary::ln)
     }
     #[inline(always)]
+    fn ln_1p(self) -> Self {
+        self.map(elementary::ln_1p)
+    }
+    #[inline(always)]
+    fn powf(self, y: Self) -> Self {
+        self.zip(y, <f32 as Real>::powf)
+    }
+    #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         let both = self.0.map(elementary::sin_cos);
         (F32x8(both.map(|b| b.0)), F32x8(both.map(|b| b.1)))
@@ -305,7 +327,7 @@ impl Real for F32x8 {
     }
     #[inline(always)]
     fn pick(table: &[f32], index: Self) -> Self {
-        index.map(|i| table[i as usize])
+        index.map(|i| <f32 as Lift<f32>>::gather(table, i))
     }
 }
 
@@ -316,7 +338,7 @@ impl Lift<f32> for F32x8 {
     }
     #[inline(always)]
     fn gather(table: &[f32], index: Self) -> Self {
-        index.map(|i| table[i as usize])
+        index.map(|i| <f32 as Lift<f32>>::gather(table, i))
     }
 }
 
@@ -338,7 +360,8 @@ impl Lift<f32> for f32 {
     }
     #[inline(always)]
     fn gather(table: &[f32], index: f32) -> f32 {
-        table[index as usize]
+        // No panic in sight: a loop over this becomes vector code.
+        table.get(elementary::index(index)).copied().unwrap_or(0.0)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Numbers, vectors, frames and sampling: what lobe maths stands on. Knows no lobe.
 
+pub mod dispatch;
 pub mod elementary;
 pub mod frame;
 pub mod lanes;

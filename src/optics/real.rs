@@ -73,7 +73,7 @@ pub trait Real:
     /// `a` where the mask is set, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
 
-    /// xʸ for x ≥ 0, as exp(y·ln x). 0⁰ = 1.
+    /// xʸ for x ≥ 0, as exp(y·ln x) in one base or another. 0⁰ = 1.
     fn powf(self, y: Self) -> Self {
         (y * self.ln()).exp()
     }
@@ -126,6 +126,6 @@ pub trait Scalar: Real<Mask = bool> + PartialOrd + Default {
 pub trait Lift<S>: Sized {
     /// The same value in every lane.
     fn lift(s: S) -> Self;
-    /// `table[index]` per lane; `index` holds whole numbers inside the table.
+    /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
     fn gather(table: &[S], index: Self) -> Self;
 }

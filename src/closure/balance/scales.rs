@@ -100,8 +100,8 @@ impl<'m, S: Scalar> Balanced<'m, S> {
         Balanced { scales, row, toward_viewer: scales.read(row, cos_o) }
     }
 
-    /// s(ωo)·s(ωi) for the cosine of ωi.
-    #[inline(always)]
+    /// s(ωo)·s(ωi) for the cosine of ωi. Never inlined: walks without it stay short.
+    #[inline(never)]
     pub fn scale<L: Real + Lift<S>>(&self, cos: L) -> Rgb<L> {
         let s = self.scales.read(self.row, cos);
         std::array::from_fn(|c| L::lift(self.toward_viewer[c]) * s[c])

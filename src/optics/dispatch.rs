@@ -1,0 +1,31 @@
+//! Vector code chosen at run time: the one place that asks what the processor can do.
+//!
+//! A plain build targets the oldest processors of its family. [`widest`] compiles the work it is given a second time, for
+//! wider vectors, and runs whichever the machine has. Both do the same operations in the same order – no fused
+//! multiply-add – so that results do not depend on the machine.
+#![allow(unsafe_code)]
+
+/// Something to run. `run` and all it calls should be `#[inline(always)]`: what is not inlined stays as narrow as the build.
+pub trait Work {
+    /// What it gives.
+    type Output;
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
+
+/// Runs `work` with the widest vectors at hand.
+#[inline]
+pub fn widest<W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<W: Work>(work: W) -> W::Output {
+            work.run()
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just been found to have what `avx2` is compiled for.
+            return unsafe { avx2(work) };
+        }
+    }
+    work.run()
+}
