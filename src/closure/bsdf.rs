@@ -34,6 +34,11 @@ pub struct Sample<S = f32> {
     pub weight: Rgb<S>,
     /// What kind of scattering it is.
     pub flags: SampleFlags,
+    /// Index of refraction on ωi's side over that on ωo's: 1 unless the sampled lobe refracts. Radiance carried from ωi
+    /// to ωo is divided by its square; f is not.
+    pub eta: S,
+    /// How wide the lobe that was chosen scatters: 0 one direction, 1 as wide as a diffuse surface.
+    pub roughness: S,
 }
 
 /// What kind of scattering a sample is.
@@ -92,7 +97,7 @@ pub(crate) enum Op {
 #[derive(Clone, Debug)]
 pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) wo: V3<S>,
-    ng: V3<S>,
+    pub(super) ng: V3<S>,
     pub(crate) layering: Layering,
     /// The most layers open at once.
     depth: u16,
@@ -129,6 +134,16 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
+    /// Black again for another point, keeping what memory there is.
+    pub(super) fn reset(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
+        (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
+        self.ops.clear();
+        self.lobes.clear();
+        self.layers.clear();
+        self.frames.clear();
+        self.emission = [S::zero(); 3];
+    }
+
     /// A BSDF that scatters nothing.
     pub fn black() -> Self {
         let zero = V3::new(S::zero(), S::zero(), S::zero());
@@ -163,15 +178,14 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         Eval { f_cos, pdf }
     }
 
-    /// [`eval`](Self::eval) of many directions at once, eight at a time. Gives bit for bit what `eval` gives.
-    ///
-    /// # Panics
-    /// If `out` is shorter than `wi`.
+    /// [`eval`](Self::eval) of many directions at once, eight at a time. Gives bit for bit what `eval` gives. Like a
+    /// `zip` it ends with the shorter of the two slices.
     pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval])
     where
         F32x8: Lift<S>,
     {
-        assert!(out.len() >= wi.len(), "{} results for {} directions", out.len(), wi.len());
+        let count = wi.len().min(out.len());
+        let (wi, out) = (&wi[..count], &mut out[..count]);
         for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
             let lane = |c: usize| F32x8(std::array::from_fn(|i| wi.get(i).map_or(0.0, |w| w[c])));
             let mut pdf = F32x8::zero();
@@ -217,18 +231,26 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
             let flags = SampleFlags { transmit: transmit(wi), delta: true };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags);
+            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, l);
         }
         let wi = frame.to_world(l.lobe.sample([u[0], u[1]]));
         let eval = self.eval([wi.x, wi.y, wi.z]);
-        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false })
+        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false }, l)
     }
 
-    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags) -> Option<Sample<S>> {
+    /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
+    pub fn sample_batch(&self, u: &[[S; 3]], out: &mut [Option<Sample<S>>]) {
+        for (u, out) in u.iter().zip(out) {
+            *out = self.sample(*u);
+        }
+    }
+
+    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, lobe: &FlatLobe<'m, S>) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
         let fine = pdf > S::zero() && weight.iter().all(|w| w.is_finite());
-        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags })
+        let (eta, roughness) = (S::one(), lobe.lobe.roughness());
+        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta, roughness })
     }
 
     /// The lobe that `u` in [0, 1) falls to.
