@@ -9,7 +9,10 @@ const STACKS: &[(&str, &str)] = &[
     ("diffuse", "surface s() { Ci = diffuse(N); }"),
     ("sheen", "surface s() { Ci = sheen_bsdf(N, color(0.8, 0.3, 0.2), 0.4); }"),
     ("sheen_diffuse", "surface s() { Ci = 0.7 * diffuse(N); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.4); }"),
-    ("sheen_oren", "surface s() { Ci = color(0.7, 0.5, 0.2) * oren_nayar(N, 0.4); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.4); }"),
+    (
+        "sheen_oren",
+        "surface s() { Ci = color(0.7, 0.5, 0.2) * oren_nayar(N, 0.4); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.4); }",
+    ),
     ("sheen_u", "surface s() { Ci = 0.7 * diffuse(N); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.1 + 0.8 * u); }"),
     ("velvet_eon", "surface s() { Ci = layer(0.4 * velvet(N, 0.3), 0.8 * eon(N, color(0.8), 0.5)); }"),
 ];
@@ -39,7 +42,8 @@ fn directions() -> Vec<[f32; 3]> {
 fn shade_and_flatten(bencher: Bencher, name: &str) {
     let material = material(name);
     let globals = Globals::default();
-    bencher.bench_local(|| black_box(material.shade(black_box(&globals), black_box(WO.into()))).map(|b| b.lobe_count()));
+    bencher
+        .bench_local(|| black_box(material.shade(black_box(&globals), black_box(WO.into()))).map(|b| b.lobe_count()));
 }
 
 #[divan::bench(args = names())]

@@ -4,21 +4,31 @@
 //! parameters set becomes a material, and only then are the albedo tables baked, for the lobes that are left. A
 //! material is shared between threads and shaded point by point; shading never bakes.
 
+mod error;
+mod owned;
+mod values;
+
+pub use crate::closure::Scratch;
+pub use crate::ir::ShadeError;
+pub use error::{Error, Place, ScriptError};
+pub use owned::OwnedBsdf;
+
 use crate::Globals;
 use crate::albedo::Precision;
 use crate::closure::balance::Construction;
-use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
-use crate::closure::flatten::flatten_into;
-use crate::diag::{Diagnostic, render_all};
+use crate::closure::{
+    Balance, Balancer, Bsdf, Builder, ClosureTree, Curves, Layering, LayeringRule, TableCache, Tables, TintRule,
+    flatten, flatten_into,
+};
+use crate::diag::Diagnostic;
 use crate::ir::{self, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
 use crate::lobes;
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
-use crate::lobes::registry::Form;
+use crate::lobes::registry::{Build, Form};
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use crate::syntax::{Includes, Limits, Options};
 use glam::Vec3;
-use std::fmt;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -35,7 +45,8 @@ pub enum Tier {
 }
 
 impl Tier {
-    fn precision(self) -> Precision {
+    /// How finely the tables of the single precision path are baked.
+    pub fn precision(self) -> Precision {
         match self {
             Tier::Fast => Precision::FAST,
             Tier::Standard | Tier::Reference => Precision::STANDARD,
@@ -43,7 +54,9 @@ impl Tier {
     }
 }
 
-/// Compiles scripts. Cheap to make and to clone.
+/// Compiles scripts. Holds what is the same for a whole scene: tier, layering rule, closures of the host, where
+/// included files and textures come from. Cheap to clone; clones share the albedo tables that their materials bake, for
+/// as long as a material uses them. Any thread may use it.
 ///
 /// ```
 /// use overcoat::{Engine, Globals};
@@ -61,6 +74,14 @@ pub struct Engine {
     hosts: Arc<[Form]>,
     options: Options,
     host: Option<Arc<dyn Host>>,
+    caches: Arc<Caches>,
+}
+
+/// Tables in use by materials of an engine and its clones.
+#[derive(Debug, Default)]
+struct Caches {
+    single: Arc<TableCache<f32>>,
+    double: TableCache<f64>,
 }
 
 impl Engine {
@@ -160,6 +181,26 @@ impl Engine {
         self.layering
     }
 
+    /// Compiles a script and makes a material with every parameter at its default: [`compile`](Self::compile), then
+    /// [`Shader::material`].
+    ///
+    /// # Errors
+    /// Everything that is wrong with the script, with its places.
+    pub fn material(&self, name: &str, text: &str) -> Result<Material, ScriptError> {
+        self.compile(name, text)?.material(&[])
+    }
+
+    /// Builds closure trees in code, without a script, from the built-in closures and those registered here, with this
+    /// engine's tier and layering rule.
+    pub fn builder(&self) -> Builder {
+        let hosts = self.hosts.iter().filter_map(|form| match form.build {
+            Build::Lobe { kind, .. } => Some(kind),
+            Build::Wrap { .. } | Build::Layer => None,
+        });
+        let builder = Builder::new().layering(self.layering).precision(self.tier.precision());
+        builder.known(hosts, self.caches.single.clone())
+    }
+
     /// Compiles a script. `name` names it in messages, and the shader if the script does not.
     ///
     /// # Errors
@@ -232,11 +273,11 @@ impl Shader {
 
     fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
-        let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
+        let engine = &self.engine;
+        let tables = Baked::new(&program, engine.layering, engine.tier.precision(), &engine.caches.single);
         program.kept();
         let inner = Inner {
-            engine: self.engine.clone(),
-            name: self.name().to_owned(),
+            shader: self.clone(),
             set: set.to_vec(),
             program,
             tables,
@@ -259,8 +300,7 @@ pub struct Material {
 
 #[derive(Debug)]
 struct Inner {
-    engine: Engine,
-    name: String,
+    shader: Shader,
     set: Vec<(String, Value)>,
     program: Program,
     tables: Baked<f32>,
@@ -271,17 +311,64 @@ struct Inner {
 impl Material {
     /// The name of the shader it came from.
     pub fn name(&self) -> &str {
-        &self.inner.name
+        self.shader().name()
+    }
+
+    /// The shader it came from: what parameters there are.
+    pub fn shader(&self) -> &Shader {
+        &self.inner.shader
+    }
+
+    /// Sets one more parameter; those set before keep their values. Specialises again, and bakes tables that no other
+    /// material of the engine holds: a matter of once per edit, not per point. Clones made before stay as they were.
+    ///
+    /// ```
+    /// use overcoat::{Engine, Globals};
+    /// let red = Engine::new().material("a", "surface a(color c = color(1, 0, 0)) { Ci = c * diffuse(N); }")?;
+    /// let mut blue = red.clone();
+    /// blue.set("c", [0.0, 0.0, 1.0])?;
+    /// assert_eq!(blue.shade(&Globals::default(), glam::Vec3::Z)?.albedo(), [0.0, 0.0, 1.0]);
+    /// assert!(blue.set("d", 0.5).unwrap_err().to_string().contains("no parameter `d`"));
+    /// # Ok::<(), overcoat::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// An unknown parameter (E0401), a value of the wrong type (E0402), an unknown word; the material stays as it was.
+    pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<(), ScriptError> {
+        self.set_all([(name, value.into())])
+    }
+
+    /// [`set`](Self::set) for several parameters at the price of one.
+    ///
+    /// # Errors
+    /// As for [`set`](Self::set), all at once.
+    pub fn set_all<'n>(&mut self, set: impl IntoIterator<Item = (&'n str, Value)>) -> Result<(), ScriptError> {
+        let mut all = self.inner.set.clone();
+        for (name, value) in set {
+            all.retain(|(n, _)| n != name);
+            all.push((name.to_owned(), value));
+        }
+        *self = self.shader().material(&all)?;
+        Ok(())
+    }
+
+    /// Whether `other` is a clone of this one: they share their tables.
+    pub fn is_same(&self, other: &Material) -> bool {
+        Arc::ptr_eq(&self.inner, &other.inner)
+    }
+
+    fn engine(&self) -> &Engine {
+        &self.inner.shader.engine
     }
 
     /// The tier of the engine that made it.
     pub fn tier(&self) -> Tier {
-        self.inner.engine.tier
+        self.engine().tier
     }
 
     /// How its layers scale.
     pub fn layering(&self) -> Layering {
-        self.inner.engine.layering
+        self.engine().layering
     }
 
     /// The parameters that were set, and to what.
@@ -317,6 +404,28 @@ impl Material {
         self.flattened(globals, V3::from_f32(wo.to_array()), &self.inner.tables)
     }
 
+    /// [`shade`](Self::shade) into memory that is used again. The BSDF lives until the next use of `scratch`.
+    ///
+    /// # Errors
+    /// If the closure tree goes beyond a budget; the BSDF in `scratch` is then black.
+    pub fn shade_in<'m, 's>(
+        &'m self,
+        globals: &Globals,
+        wo: Vec3,
+        scratch: &'s mut Scratch<'m>,
+    ) -> Result<&'s Bsdf<'m>, ShadeError> {
+        let globals = Globals { i: -wo, ..*globals };
+        let Scratch { tree, bsdf } = scratch;
+        let shaded = self.inner.program.shade(&globals, tree);
+        if shaded.is_err() {
+            tree.clear();
+        }
+        let Baked { curves, balance } = &self.inner.tables;
+        let tables = Tables { curves, balance: balance.as_ref() };
+        flatten_into(tree, &globals, V3::from_f32(wo.to_array()), self.engine().layering, tables, bsdf)?;
+        shaded.map(|()| &*bsdf)
+    }
+
     /// [`shade`](Self::shade) in double precision, with the reference tier's albedos. They are baked on the first call
     /// unless the engine's tier is [`Tier::Reference`].
     ///
@@ -333,7 +442,7 @@ impl Material {
     /// If the tree goes beyond a budget.
     pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
         let wo = V3::from_f32(wo.to_array());
-        Ok(flatten(tree, globals, wo, self.inner.engine.layering, &self.inner.tables.curves)?)
+        Ok(flatten(tree, globals, wo, self.engine().layering, &self.inner.tables.curves)?)
     }
 
     /// [`flatten`](Self::flatten) in double precision.
@@ -347,7 +456,7 @@ impl Material {
         wo: [f64; 3],
     ) -> Result<Bsdf<'_, f64>, ShadeError> {
         let wo = V3::new(wo[0], wo[1], wo[2]);
-        Ok(flatten(tree, globals, wo, self.inner.engine.layering, &self.reference_tables().curves)?)
+        Ok(flatten(tree, globals, wo, self.engine().layering, &self.reference_tables().curves)?)
     }
 
     fn flattened<'m, S: Scalar>(
@@ -362,17 +471,17 @@ impl Material {
         let mut tree = ClosureTree::new();
         self.inner.program.shade(&globals, &mut tree)?;
         let tables = Tables { curves: &tables.curves, balance: tables.balance.as_ref() };
-        tree.within_budget()?;
         // Likewise.
         let mut shaded = Ok(Bsdf::black());
         if let Ok(bsdf) = &mut shaded {
-            flatten_into(bsdf, &tree, &globals, wo, self.inner.engine.layering, tables);
+            flatten_into(&tree, &globals, wo, self.engine().layering, tables, bsdf)?;
         }
         shaded
     }
 
     fn reference_tables(&self) -> &Baked<f64> {
-        let bake = || Baked::new(&self.inner.program, self.inner.engine.layering, Precision::REFERENCE);
+        let (layering, cache) = (self.layering(), &self.engine().caches.double);
+        let bake = || Baked::new(&self.inner.program, layering, Precision::REFERENCE, cache);
         self.inner.reference.get_or_init(bake)
     }
 
@@ -400,10 +509,10 @@ struct Baked<S: Scalar> {
 }
 
 impl<S: Scalar> Baked<S> {
-    fn new(program: &Program, layering: Layering, precision: Precision) -> Self {
+    fn new(program: &Program, layering: Layering, precision: Precision, cache: &TableCache<S>) -> Self {
         let mut curves = Curves::default();
         for (index, site) in program.sites().iter().enumerate() {
-            curves.set(index as u32, site.kind.table(&site.values), precision);
+            curves.set_shared(index as u32, site.kind.table(&site.values), precision, cache);
         }
         let balanced = layering.rule == LayeringRule::Balanced;
         let balance = balanced.then(|| balance(program, layering.tint, &curves, precision));
@@ -438,29 +547,3 @@ fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, pre
     let sites: Vec<_> = sites.iter().map(|s| Construction { kind: s.kind, values: &s.values }).collect();
     balancer.solve_pairs(&sites, pairs, tint, curves)
 }
-
-/// What is wrong with a script.
-#[derive(Clone, Debug)]
-pub struct ScriptError {
-    /// The script.
-    pub source: Arc<Source>,
-    /// All that is wrong, with places.
-    pub diagnostics: Vec<Diagnostic>,
-}
-
-impl ScriptError {
-    /// The messages with their source lines; `color` adds terminal colours.
-    pub fn render(&self, color: bool) -> String {
-        render_all(&self.diagnostics, &self.source, color)
-    }
-}
-
-impl fmt::Display for ScriptError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.render(false))
-    }
-}
-
-impl std::error::Error for ScriptError {}
-
-pub use crate::ir::ShadeError;

@@ -49,7 +49,7 @@
 //! assert!(error.to_string().contains("did you mean `diffuse`?"));
 //! ```
 //!
-//! Without scripts, [`closure::ClosureTree`] is built in code and flattened with [`closure::flatten()`].
+//! Without scripts, a host composes closures in code: [`closure::Builder`].
 
 pub mod albedo;
 pub mod audit;
@@ -68,5 +68,5 @@ pub mod prove;
 pub mod span;
 pub mod syntax;
 
-pub use engine::{Engine, Material, Shader};
+pub use engine::{Engine, Error, Material, OwnedBsdf, Scratch, Shader};
 pub use globals::Globals;

@@ -9,7 +9,7 @@ use super::layer::{LayerStack, LayeringRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
-use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch, frame};
+use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -34,6 +34,11 @@ pub struct Sample<S = f32> {
     pub weight: Rgb<S>,
     /// What kind of scattering it is.
     pub flags: SampleFlags,
+    /// Index of refraction on ωi's side over that on ωo's: 1 unless the sampled lobe refracts. Radiance carried from ωi
+    /// to ωo is divided by its square; f is not.
+    pub eta: S,
+    /// How wide the lobe that was chosen scatters: 0 one direction, 1 as wide as a diffuse surface.
+    pub roughness: S,
 }
 
 /// What kind of scattering a sample is.
@@ -92,7 +97,7 @@ pub(crate) enum Op {
 #[derive(Clone, Debug)]
 pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) wo: V3<S>,
-    ng: V3<S>,
+    pub(super) ng: V3<S>,
     pub(crate) layering: Layering,
     /// The most layers open at once.
     depth: u16,
@@ -131,12 +136,14 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
-    /// Makes a black BSDF ready to be filled; `wo` and `ng` of any length.
-    pub(crate) fn begin(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
-        self.wo = frame::normalize(wo).unwrap_or(self.wo);
-        self.ng = frame::normalize(ng).unwrap_or(self.ng);
-        self.layering = layering;
-        self.depth = depth;
+    /// Black again for another point, keeping what memory there is.
+    pub(super) fn reset(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
+        (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
+        self.ops.clear();
+        self.lobes.clear();
+        self.layers.clear();
+        self.frames.clear();
+        self.emission = [S::zero(); 3];
     }
 
     /// Turns estimated albedos into probabilities and drops nothing.
@@ -161,15 +168,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// 2, gives black and pdf 0.
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
         let mut sum = Eval { f_cos: [S::zero(); 3], pdf: S::zero() };
-        self.walk(
-            vector(wi.into()),
-            false,
-            |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-                let e = l.lobe.evaluate(local, l.curve, bound);
-                sum.add(l, scale, local.z, &e);
-                e.bound
-            },
-        );
+        self.walk(vector(wi.into()), false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+            let e = l.lobe.evaluate(local, l.curve, bound);
+            sum.add(l, scale, local.z, &e);
+            e.bound
+        });
         sum.f_cos = sum.f_cos.map(finite);
         sum
     }
@@ -207,18 +210,26 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
             let flags = SampleFlags { transmit: transmit(wi), delta: true };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags);
+            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, l);
         }
         let wi = frame.to_world(l.lobe.sample([u[0], u[1]]));
         let eval = self.eval([wi.x, wi.y, wi.z]);
-        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false })
+        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false }, l)
     }
 
-    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags) -> Option<Sample<S>> {
+    /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
+    pub fn sample_batch(&self, u: &[[S; 3]], out: &mut [Option<Sample<S>>]) {
+        for (u, out) in u.iter().zip(out) {
+            *out = self.sample(*u);
+        }
+    }
+
+    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, lobe: &FlatLobe<'m, S>) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
         let fine = pdf > S::zero() && weight.iter().all(|w| w.is_finite());
-        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags })
+        let (eta, roughness) = (S::one(), lobe.lobe.roughness());
+        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta, roughness })
     }
 
     /// The lobe that `u` in [0, 1) falls to.
@@ -297,16 +308,12 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         let wi = self.frames[l.frame as usize].to_world(local);
         let mut scale = [S::one(); 3];
         if layered {
-            self.walk(
-                wi,
-                false,
-                |i, l: &FlatLobe<'m, S>, s: Rgb<S>, local: V3<S>, bound| {
-                    if i == index {
-                        scale = s
-                    }
-                    l.bound(local, bound)
-                },
-            );
+            self.walk(wi, false, |i, l: &FlatLobe<'m, S>, s: Rgb<S>, local: V3<S>, bound| {
+                if i == index {
+                    scale = s
+                }
+                l.bound(local, bound)
+            });
         }
         Some(std::array::from_fn(|c| l.weight[c] * scale[c] * part[c]))
     }
@@ -314,36 +321,28 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// w·f·|cos θi| of lobe `index` alone, with or without the layers above it.
     pub(crate) fn lobe_part(&self, index: usize, wi: V3<S>, layered: bool) -> Rgb<S> {
         let mut result = [S::zero(); 3];
-        self.walk(
-            wi,
-            false,
-            |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-                if i == index {
-                    let scale = if layered { scale } else { [S::one(); 3] };
-                    result = weighted(l, scale, local, Cosine::Light);
-                }
-                l.bound(local, bound)
-            },
-        );
+        self.walk(wi, false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+            if i == index {
+                let scale = if layered { scale } else { [S::one(); 3] };
+                result = weighted(l, scale, local, Cosine::Light);
+            }
+            l.bound(local, bound)
+        });
         result
     }
 
     /// Like `eval`, its cosine chosen, with only the lobes whose frame and kind `pick` accepts.
     pub(crate) fn part(&self, wi: V3<S>, cosine: Cosine, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
         let mut sum = [S::zero(); 3];
-        self.walk(
-            wi,
-            false,
-            |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-                if pick(&self.frames[l.frame as usize], l.kind) {
-                    let part = weighted(l, scale, local, cosine);
-                    for c in 0..3 {
-                        sum[c] += part[c];
-                    }
+        self.walk(wi, false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+            if pick(&self.frames[l.frame as usize], l.kind) {
+                let part = weighted(l, scale, local, cosine);
+                for c in 0..3 {
+                    sum[c] += part[c];
                 }
-                l.bound(local, bound)
-            },
-        );
+            }
+            l.bound(local, bound)
+        });
         sum.map(finite)
     }
 
@@ -429,12 +428,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 }
 
 impl<'m> Bsdf<'m, f32> {
-    /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are.
-    ///
-    /// # Panics
-    /// If `out` is shorter than `wi`.
+    /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are. Like a
+    /// `zip` it ends with the shorter of the two slices.
     pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
-        assert!(out.len() >= wi.len(), "{} results for {} directions", out.len(), wi.len());
+        let count = wi.len().min(out.len());
+        let (wi, out) = (&wi[..count], &mut out[..count]);
         if usize::from(self.depth) <= DEPTH_IN_LANES {
             dispatch::widest(Batch { bsdf: self, wi, out });
         } else {

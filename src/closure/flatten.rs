@@ -12,14 +12,41 @@ use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{Scalar, V3};
+use crate::optics::{Scalar, V3, frame};
 use glam::Vec3;
 use smallvec::SmallVec;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+/// Tables that materials share: what one has baked, another of the same lobe and parameters takes from here. Keeps no
+/// table that nothing uses any more.
+#[derive(Debug, Default)]
+pub struct TableCache<S>(Mutex<Vec<Shared<S>>>);
+
+/// What a table was baked for, and the table while somebody holds it.
+type Shared<S> = (TableSpec, Precision, Weak<AlbedoCurve<S>>);
+
+impl<S: Scalar> TableCache<S> {
+    /// The table of `spec`, baked if nobody holds it.
+    fn get(&self, spec: &TableSpec, precision: Precision) -> Arc<AlbedoCurve<S>> {
+        let held = |tables: &mut Vec<Shared<S>>| {
+            tables.retain(|t| t.2.strong_count() > 0);
+            tables.iter().find(|t| t.1 == precision && t.0 == *spec).and_then(|t| t.2.upgrade())
+        };
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(table) = held(&mut lock()) {
+            return table;
+        }
+        // Not while holding the lock: baking takes up to a second.
+        let table = Arc::new(spec.bake(precision));
+        lock().push((*spec, precision, Arc::downgrade(&table)));
+        table
+    }
+}
 
 /// The albedo curves of a material, found by the site that constructs the lobe.
 #[derive(Clone, Debug, Default)]
 pub struct Curves<S: Scalar> {
-    baked: Vec<(TableSpec, AlbedoCurve<S>)>,
+    baked: Vec<(TableSpec, Arc<AlbedoCurve<S>>)>,
     /// Index into `baked` per site.
     sites: Vec<Option<u32>>,
     none: AlbedoCurve<S>,
@@ -38,11 +65,16 @@ impl<S: Scalar> Curves<S> {
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
     pub fn set(&mut self, site: u32, spec: Option<TableSpec>, precision: Precision) {
+        self.set_shared(site, spec, precision, &TableCache::default());
+    }
+
+    /// [`set`](Self::set) with a table that others may hold too.
+    pub fn set_shared(&mut self, site: u32, spec: Option<TableSpec>, precision: Precision, cache: &TableCache<S>) {
         let Some(spec) = spec else { return };
         let index = match self.baked.iter().position(|(s, _)| *s == spec) {
             Some(i) => i,
             None => {
-                self.baked.push((spec, spec.bake(precision)));
+                self.baked.push((spec, cache.get(&spec, precision)));
                 self.baked.len() - 1
             }
         };
@@ -100,42 +132,44 @@ pub fn flatten<'m, S: Scalar>(
     layering: Layering,
     tables: impl Into<Tables<'m, S>>,
 ) -> Result<Bsdf<'m, S>, TreeError> {
-    tree.within_budget()?;
     // Written where the caller has room for it: a BSDF with room for eight lobes is too large to pass around.
     let mut flat = Ok(Bsdf::black());
     if let Ok(bsdf) = &mut flat {
-        flatten_into(bsdf, tree, globals, wo, layering, tables.into());
+        flatten_into(tree, globals, wo, layering, tables, bsdf)?;
     }
     flat
 }
 
-/// [`flatten`] of a tree within its budget, into a black BSDF.
-pub(crate) fn flatten_into<'m, S: Scalar>(
-    bsdf: &mut Bsdf<'m, S>,
+/// [`flatten`] into a BSDF whose memory is used again. After an error it is black.
+///
+/// # Errors
+/// If the tree is beyond [`MAX_LAYERS`] or [`super::tree::MAX_LOBES`].
+pub fn flatten_into<'m, S: Scalar>(
     tree: &ClosureTree,
     globals: &Globals,
     wo: V3<S>,
     layering: Layering,
-    tables: Tables<'m, S>,
-) {
+    tables: impl Into<Tables<'m, S>>,
+    bsdf: &mut Bsdf<'m, S>,
+) -> Result<(), TreeError> {
     let layers = tree.size(tree.root()).layers;
-    bsdf.begin(wo, V3::from_f32(globals.ng.to_array()), layering, layers);
+    let zero = V3::new(S::zero(), S::zero(), S::zero());
+    let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
+    bsdf.reset(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
+    tree.within_budget()?;
+    let tables = tables.into();
     match layers {
         0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
-        _ => flatten_deep(bsdf, tree, globals, tables),
+        _ => flatten_deep(tree, globals, tables, bsdf),
     }
     bsdf.finish();
+    Ok(())
 }
 
 /// Apart, because its stack is large.
 #[cold]
 #[inline(never)]
-fn flatten_deep<'m, S: Scalar>(
-    bsdf: &mut Bsdf<'m, S>,
-    tree: &ClosureTree,
-    globals: &Globals,
-    tables: Tables<'m, S>,
-) {
+fn flatten_deep<'m, S: Scalar>(tree: &ClosureTree, globals: &Globals, tables: Tables<'m, S>, bsdf: &mut Bsdf<'m, S>) {
     walk(tree, &mut Flattener::<S, { MAX_LAYERS as usize }>::new(globals, tables, bsdf));
 }
 

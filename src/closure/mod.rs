@@ -2,13 +2,19 @@
 
 pub mod balance;
 pub mod bsdf;
+pub mod builder;
 pub mod flatten;
 pub mod layer;
+pub mod query;
+mod scratch;
 pub mod tree;
 mod walk;
 
 pub use balance::{Balance, Balancer, Fate, Unbalanced};
 pub use bsdf::{Bsdf, Eval, Sample, SampleFlags};
-pub use flatten::{Curves, Layering, Tables, flatten};
+pub use builder::{Builder, Composite};
+pub use flatten::{Curves, Layering, TableCache, Tables, flatten, flatten_into};
 pub use layer::{LayeringRule, TintRule};
+pub use query::{Scattering, Transport};
+pub use scratch::Scratch;
 pub use tree::{ClosureTree, Node, NodeId, Size, TreeError};

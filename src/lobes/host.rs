@@ -8,7 +8,7 @@
 //! that is too low is not found out here, but by the audits.
 
 use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
-use super::{LobeKind, Rgb, Rgb32};
+use super::{LobeKind, Rgb, Rgb32, Sides};
 use crate::optics::{Lift, Real, V3, sampling};
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -43,6 +43,17 @@ pub trait HostLobe: Send + Sync {
     fn pdf(&self, values: &[f32], wo: [f64; 3], wi: [f64; 3]) -> f64 {
         let _ = values;
         sampling::cosine_hemisphere_pdf(wi[2].copysign(wi[2] * wo[2]))
+    }
+
+    /// To which sides it may scatter, for hosts that ask.
+    fn sides(&self) -> Sides {
+        Sides::REFLECT
+    }
+
+    /// How wide it scatters: 0 one direction, 1 as wide as a diffuse surface.
+    fn roughness(&self, values: &[f32]) -> f64 {
+        let _ = values;
+        1.0
     }
 }
 
@@ -329,6 +340,16 @@ impl<S: Real> Host<S> {
             self.kind.0.lobe.sample(&self.values, [a, b, c], [u, v])
         });
         V3::new(x, y, z)
+    }
+
+    /// See [`super::Lobe::sides`].
+    pub fn sides(&self) -> Sides {
+        self.kind.0.lobe.sides()
+    }
+
+    /// See [`super::Lobe::roughness`].
+    pub fn roughness(&self) -> S {
+        S::c(sane(self.kind.0.lobe.roughness(&self.values)).min(1.0))
     }
 
     /// See [`super::Lobe::albedo`].

@@ -38,6 +38,24 @@ pub type Rgb<R> = [R; 3];
 /// A colour as scripts hold it: linear RGB.
 pub type Rgb32 = [f32; 3];
 
+/// To which sides of its own surface a prepared lobe may scatter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sides {
+    /// Back to the side ωo is on.
+    pub reflect: bool,
+    /// To the other side.
+    pub transmit: bool,
+}
+
+impl Sides {
+    /// Back to the side ωo is on.
+    pub const REFLECT: Sides = Sides { reflect: true, transmit: false };
+    /// To the other side.
+    pub const TRANSMIT: Sides = Sides { reflect: false, transmit: true };
+    /// Both.
+    pub const BOTH: Sides = Sides { reflect: true, transmit: true };
+}
+
 /// One model of scattering, prepared for one ωo.
 ///
 /// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
@@ -114,6 +132,16 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// reflectance that bounds it. [`limits`](Lobe::limits) leaves it out.
     fn tint_slot() -> Option<usize> {
         None
+    }
+
+    /// To which sides this instance may scatter.
+    fn sides(&self) -> Sides {
+        Sides::REFLECT
+    }
+
+    /// How wide this instance scatters: 0 one direction, 1 as wide as a diffuse surface. Perceptual, as users set it.
+    fn roughness(&self) -> S {
+        S::one()
     }
 
     /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
@@ -279,6 +307,14 @@ macro_rules! lobes {
             /// See [`Lobe::view_bound`].
             pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
                 match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
+            }
+            /// See [`Lobe::sides`].
+            pub fn sides(&self) -> Sides {
+                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::sides(l), )* AnyLobe::Host(l) => l.sides() }
+            }
+            /// See [`Lobe::roughness`].
+            pub fn roughness(&self) -> S {
+                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::roughness(l), )* AnyLobe::Host(l) => l.roughness() }
             }
             /// See [`Lobe::delta`].
             #[inline]

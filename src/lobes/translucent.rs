@@ -2,7 +2,7 @@
 
 use super::limits::{Limits, SlotRange};
 use super::registry::closure;
-use super::{Lobe, Rgb};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Lift, Real, V3, sampling};
 
@@ -35,6 +35,10 @@ impl<S: Real> Lobe<S> for Translucent<S> {
         let zero = S::zero();
         let below = S::select(wo.z.lt(zero), -S::one(), zero);
         Translucent { side: S::select(wo.z.gt(zero), S::one(), below) }
+    }
+
+    fn sides(&self) -> Sides {
+        Sides::TRANSMIT
     }
 
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {

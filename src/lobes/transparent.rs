@@ -2,7 +2,7 @@
 
 use super::limits::{Limits, SlotRange};
 use super::registry::closure;
-use super::{Lobe, Rgb};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Lift, Real, V3};
 
@@ -29,6 +29,14 @@ impl<S: Real> Lobe<S> for Transparent<S> {
 
     fn new(_: &TransparentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         Transparent { wo }
+    }
+
+    fn sides(&self) -> Sides {
+        Sides::TRANSMIT
+    }
+
+    fn roughness(&self) -> S {
+        S::zero()
     }
 
     fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
