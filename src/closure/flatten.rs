@@ -247,26 +247,14 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         let curve = self.curves.of(site);
         let normal = self.bsdf.frames[frame as usize].n;
         let wo = self.bsdf.frames[frame as usize].to_local(self.bsdf.wo);
-        let lobe = AnyLobe::new(kind, values, wo, curve);
         let scale = self.stack.scale();
-        if let AnyLobe::Emission(emission) = lobe {
-            for c in 0..3 {
-                self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
-            }
-            return;
-        }
-        let albedo = lobe.albedo(wo, curve);
-        let share: Rgb<S> = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
-        let bound = if view { lobe.view_bound(wo, curve) } else { lobe.albedo_bound(wo, curve) };
-        self.stack.lobe(w.in_top, bound);
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
-        if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
-            self.chained(|chain| chain.lobe(&visit, normal, param));
-        }
-        self.bsdf.lobes.push(FlatLobe {
-            lobe,
+        let lobes = &mut self.bsdf.lobes;
+        // Made where it stays, because it is large.
+        lobes.push(FlatLobe {
+            lobe: AnyLobe::new(kind, values, wo, curve),
             curve,
             kind,
             site,
@@ -276,10 +264,27 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             weight_in_top: w.in_top,
             in_top: w.inside && !view,
             delta: kind.class() == LobeClass::Delta,
-            albedo: share,
+            albedo: [S::zero(); 3],
             balanced,
             probability: S::zero(),
         });
+        let Some(l) = lobes.last_mut() else { return };
+        if let AnyLobe::Emission(emission) = l.lobe {
+            for c in 0..3 {
+                self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
+            }
+            lobes.pop();
+            return;
+        }
+        let albedo = l.lobe.albedo(wo, curve);
+        l.albedo = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
+        if w.inside {
+            let bound = if view { l.lobe.view_bound(wo, curve) } else { l.lobe.albedo_bound(wo, curve) };
+            self.stack.lobe(w.in_top, bound);
+        }
+        if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
+            self.chained(|chain| chain.lobe(&visit, normal, param));
+        }
         self.bsdf.ops.push(Op::Lobe);
     }
 }

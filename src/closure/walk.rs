@@ -62,21 +62,22 @@ enum Step<S> {
 pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>) {
     let one = [S::one(); 3];
     let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
-    steps.push(Step::Visit(tree.root(), Weights { total: one, in_top: one, inside: false }));
-    while let Some(step) = steps.pop() {
-        match step {
-            Step::Visit(id, w) => match tree.node(id) {
+    let mut next = Some((tree.root(), Weights { total: one, in_top: one, inside: false }));
+    loop {
+        // Down the first branch as far as it goes; what stands beside it waits.
+        while let Some((id, w)) = next.take() {
+            match tree.node(id) {
                 Node::Zero => {}
                 Node::Add(a, b) => {
                     steps.push(Step::Visit(b, w));
-                    steps.push(Step::Visit(a, w));
+                    next = Some((a, w));
                 }
-                Node::Mul(weight, c) => steps.push(Step::Visit(c, w.times(weight.map(S::from_f32)))),
+                Node::Mul(weight, c) => next = Some((c, w.times(weight.map(S::from_f32)))),
                 Node::Layer { top, base } => {
                     steps.push(Step::End);
                     steps.push(Step::Visit(base, w));
                     steps.push(Step::Middle(w));
-                    steps.push(Step::Visit(top, Weights { in_top: one, inside: true, ..w }));
+                    next = Some((top, Weights { in_top: one, inside: true, ..w }));
                     visitor.begin();
                 }
                 Node::Lobe { kind, site, slots } => {
@@ -84,9 +85,13 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
                     let weights = w.times(kind.weight(values).map(S::from_f32));
                     visitor.lobe(LobeVisit { kind, site, values, weights });
                 }
-            },
-            Step::Middle(w) => visitor.middle(w),
-            Step::End => visitor.end(),
+            }
+        }
+        match steps.pop() {
+            Some(Step::Visit(id, w)) => next = Some((id, w)),
+            Some(Step::Middle(w)) => visitor.middle(w),
+            Some(Step::End) => visitor.end(),
+            None => return,
         }
     }
 }

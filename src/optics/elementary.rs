@@ -103,18 +103,21 @@ pub fn log2(x: f32) -> f32 {
     if x == f32::INFINITY { f32::INFINITY } else { y }
 }
 
-/// The next whole number below; x itself from 2²² on, NaN for NaN.
+/// 2²³: from here on every number is whole.
+const WHOLE: f32 = 8_388_608.0;
+
+/// The next whole number below; NaN for NaN.
 #[inline(always)]
 pub fn floor(x: f32) -> f32 {
-    let near = (x + MAGIC) - MAGIC;
+    let near = ((x.abs() + WHOLE) - WHOLE).copysign(x);
     let below = if near > x { near - 1.0 } else { near };
-    if x.abs() < 4_194_304.0 { below } else { x }
+    if x.abs() < WHOLE { below } else { x }
 }
 
 /// A whole number in [0, 2²³) as an index. Anything else: some number below 2²³.
 #[inline(always)]
 pub fn index(x: f32) -> usize {
-    ((x + 8_388_608.0).to_bits() & 0x007f_ffff) as usize
+    ((x + WHOLE).to_bits() & 0x007f_ffff) as usize
 }
 
 /// (sin x, cos x) for |x| ≤ 8π.
