@@ -5,7 +5,7 @@
 
 use super::balance::Balanced;
 use super::flatten::Layering;
-use super::layer::{LayerStack, LayeringRule};
+use super::layer::{LayerStack, LayeringRule, TintRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
@@ -364,9 +364,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Visits every lobe, then gives the bound on the whole if it is asked for.
     #[inline(always)]
     fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
-        match self.depth {
-            0..=1 => self.walk_within::<S, 1>(wi, bound, visit),
-            2..=4 => self.walk_within::<S, 4>(wi, bound, visit),
+        match (self.depth, self.layering.tint) {
+            (0, _) | (1, TintRule::Largest) => self.walk_within::<S, 1, 1>(wi, bound, visit),
+            (2..=4, TintRule::Largest) => self.walk_within::<S, 4, 1>(wi, bound, visit),
             _ => self.walk_deep(wi, bound, visit),
         }
     }
@@ -375,18 +375,21 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     #[cold]
     #[inline(never)]
     fn walk_deep(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
-        self.walk_within::<S, { MAX_LAYERS as usize }>(wi, bound, visit)
+        match self.depth {
+            0..=4 => self.walk_within::<S, 4, 3>(wi, bound, visit),
+            _ => self.walk_within::<S, { MAX_LAYERS as usize }, 3>(wi, bound, visit),
+        }
     }
 
     #[inline(always)]
-    fn walk_within<L: Real + Lift<S>, const D: usize>(
+    fn walk_within<L: Real + Lift<S>, const D: usize, const C: usize>(
         &self,
         wi: V3<L>,
         bound: bool,
         mut visit: impl Visit<'m, S, L>,
     ) -> Rgb<L> {
         let wi = unit_or_zero(wi);
-        let mut stack = LayerStack::<L, D>::default();
+        let mut stack = LayerStack::<L, D, C>::default();
         let (mut lobe, mut layer) = (0, 0);
         let mut frame = u32::MAX;
         let mut local = wi;
@@ -433,7 +436,8 @@ impl<'m> Bsdf<'m, f32> {
     pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
         let count = wi.len().min(out.len());
         let (wi, out) = (&wi[..count], &mut out[..count]);
-        if usize::from(self.depth) <= DEPTH_IN_LANES {
+        // Rare trees are not worth code of their own.
+        if usize::from(self.depth) <= DEPTH_IN_LANES && self.layering.tint == TintRule::Largest {
             dispatch::widest(Batch { bsdf: self, wi, out });
         } else {
             out.iter_mut().zip(wi).for_each(|(out, wi)| *out = self.eval(*wi));
@@ -496,7 +500,7 @@ impl dispatch::Work for Batch<'_, '_> {
             }
             let [x, y, z] = block.map(F32x8);
             let mut sum = Eval { f_cos: [F32x8::zero(); 3], pdf: F32x8::zero() };
-            bsdf.walk_within::<F32x8, DEPTH_IN_LANES>(V3::new(x, y, z), false, &mut sum);
+            bsdf.walk_within::<F32x8, DEPTH_IN_LANES, 1>(V3::new(x, y, z), false, &mut sum);
             sum.f_cos = sum.f_cos.map(finite);
             for i in 0..wi.len() {
                 out[i] = Eval { f_cos: sum.f_cos.map(|f| f.0[i]), pdf: sum.pdf.0[i] };

@@ -40,19 +40,19 @@ pub enum TintRule {
     Channel,
 }
 
-/// α = 1 − Ē, what a layer passes on.
+/// α = 1 − Ē, what a layer passes on: for each channel, or (`C` = 1, under [`TintRule::Largest`] alone) once for all.
 #[inline(always)]
-pub fn alpha<L: Real>(tint: TintRule, bound: Rgb<L>) -> Rgb<L> {
+pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
     let pass = |e: L| (L::one() - e).clamp(L::zero(), L::one());
     match tint {
-        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); 3],
-        TintRule::Channel => bound.map(pass),
+        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); C],
+        TintRule::Channel => std::array::from_fn(|c| pass(bound[c])),
     }
 }
 
 /// s(ωo, ωi), what a layer scales its base by.
 #[inline(always)]
-pub fn scale<L: Real>(rule: LayeringRule, alpha_o: Rgb<L>, alpha_i: Rgb<L>) -> Rgb<L> {
+pub fn scale<L: Real, const C: usize>(rule: LayeringRule, alpha_o: [L; C], alpha_i: [L; C]) -> [L; C] {
     match rule {
         // What was solved for takes the place of this.
         LayeringRule::Min | LayeringRule::Balanced => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
@@ -62,30 +62,31 @@ pub fn scale<L: Real>(rule: LayeringRule, alpha_o: Rgb<L>, alpha_i: Rgb<L>) -> R
 
 /// What is set aside while a layer is open.
 #[derive(Clone, Copy, Debug)]
-struct Saved<L> {
+struct Saved<L, const C: usize> {
     bound: Rgb<L>,
-    path: Rgb<L>,
-    scale: Rgb<L>,
+    path: [L; C],
+    scale: [L; C],
 }
 
 /// Walks a tree, written out as `begin top… middle base… end` per layer, for one direction.
 ///
-/// `D` is how many layers may be open at once.
-pub struct LayerStack<L, const D: usize> {
-    saved: [Saved<L>; D],
+/// `D` is how many layers may be open at once. `C` is 3, or 1 where all channels are dimmed alike ([`TintRule::Largest`]):
+/// the same numbers for a third of the work.
+pub struct LayerStack<L, const D: usize, const C: usize = 3> {
+    saved: [Saved<L, C>; D],
     open: usize,
     /// Bound on the albedo of the top being walked (outside any top: of the whole tree), so far.
     bound: Rgb<L>,
     /// What the layers between that top's root and here pass on.
-    path: Rgb<L>,
+    path: [L; C],
     /// The product of all layer scales above here.
-    scale: Rgb<L>,
+    scale: [L; C],
 }
 
-impl<L: Real, const D: usize> Default for LayerStack<L, D> {
+impl<L: Real, const D: usize, const C: usize> Default for LayerStack<L, D, C> {
     #[inline(always)]
     fn default() -> Self {
-        let (zero, one) = ([L::zero(); 3], [L::one(); 3]);
+        let (zero, one) = ([L::zero(); 3], [L::one(); C]);
         LayerStack {
             saved: [Saved { bound: zero, path: one, scale: one }; D],
             open: 0,
@@ -96,11 +97,11 @@ impl<L: Real, const D: usize> Default for LayerStack<L, D> {
     }
 }
 
-impl<L: Real, const D: usize> LayerStack<L, D> {
+impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
     /// What the layers above scale a lobe here by.
     #[inline(always)]
     pub fn scale(&self) -> Rgb<L> {
-        self.scale
+        std::array::from_fn(|c| self.scale[c % C])
     }
 
     /// The bound on the whole tree's albedo, after the walk.
@@ -116,7 +117,7 @@ impl<L: Real, const D: usize> LayerStack<L, D> {
         L: Lift<S>,
     {
         for c in 0..3 {
-            self.bound[c] = (L::lift(weight[c]) * self.path[c]).mul_add(bound[c], self.bound[c]);
+            self.bound[c] = (L::lift(weight[c]) * self.path[c % C]).mul_add(bound[c], self.bound[c]);
         }
     }
 
@@ -126,7 +127,7 @@ impl<L: Real, const D: usize> LayerStack<L, D> {
         self.saved[self.open] = Saved { bound: self.bound, path: self.path, scale: self.scale };
         self.open += 1;
         self.bound = [L::zero(); 3];
-        self.path = [L::one(); 3];
+        self.path = [L::one(); C];
     }
 
     /// The top is complete, the base follows. `weight` is the layer's own weight relative to the top it stands in;
@@ -142,19 +143,21 @@ impl<L: Real, const D: usize> LayerStack<L, D> {
     where
         L: Lift<S>,
     {
-        let alpha = alpha(tint, self.bound);
+        let alpha: [L; C] = alpha(tint, self.bound);
         // Seen from the light, `view` dims nothing: the bound there is Ē_t + Ē_b.
-        let passed = if rule == LayeringRule::View && alpha_o.is_some() { [L::one(); 3] } else { alpha };
-        let toward_viewer = alpha_o.map_or(alpha, |a| a.map(L::lift));
+        let passed = if rule == LayeringRule::View && alpha_o.is_some() { [L::one(); C] } else { alpha };
+        let toward_viewer = alpha_o.map_or(alpha, |a| std::array::from_fn(|c| L::lift(a[c])));
         let s = scale(rule, toward_viewer, alpha);
         let outer = &self.saved[self.open - 1];
         for c in 0..3 {
             // Bound of a layer as part of a top: Ē_t + α·Ē_b, per channel.
-            self.bound[c] = (L::lift(weight[c]) * outer.path[c]).mul_add(self.bound[c], outer.bound[c]);
+            self.bound[c] = (L::lift(weight[c]) * outer.path[c % C]).mul_add(self.bound[c], outer.bound[c]);
+        }
+        for c in 0..C {
             self.path[c] = outer.path[c] * passed[c];
             self.scale[c] = outer.scale[c] * s[c];
         }
-        alpha
+        std::array::from_fn(|c| alpha[c % C])
     }
 
     /// The layer is complete.
