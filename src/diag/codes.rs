@@ -92,7 +92,8 @@ pub const CODES: &[Code] = &[
     code(
         "E0202",
         "a name is declared twice",
-        "A block can declare a name once. Parameters of a shader cannot have the names of globals such as `P` or `u`.",
+        "A block can declare a name once. Parameters of a shader cannot have the names of globals such as `P` or `u`, and no\n\
+         variable that of a reserved word such as `char`.",
     ),
     code(
         "E0203",

@@ -103,23 +103,23 @@ impl Builtin {
     fn noise(&self, kind: Option<usize>, repeats: Repeats, n: usize, args: &[Cells]) -> Cells {
         let named = usize::from(kind.is_none());
         let kind = kind.unwrap_or_else(|| args.first().map_or(0, |a| f32::from_bits(a[0]) as usize));
-        let mut numbers = [0.0; 8];
+        let mut numbers = [[0.0]; 8];
         let mut count = 0;
         for (letter, arg) in self.sig.bytes().skip(1).zip(args).skip(named) {
             for cell in &arg[..if letter == b'p' { 3 } else { 1 }] {
-                numbers[count] = f32::from_bits(*cell);
+                numbers[count] = [f32::from_bits(*cell)];
                 count += 1;
             }
         }
         let dimensions = if repeats == Repeats::Periodic { count / 2 } else { count };
-        let mut at = noise::At { x: [0.0; 4], n: dimensions, period: [0.0; 4] };
+        let mut at = noise::At { x: [[0.0]; 4], n: dimensions, period: [[0.0]; 4] };
         at.x[..dimensions].copy_from_slice(&numbers[..dimensions]);
         if repeats == Repeats::Periodic {
             at.period[..dimensions].copy_from_slice(&numbers[dimensions..count]);
         }
         let mut out = [0; 3];
         for (channel, cell) in out.iter_mut().enumerate().take(n) {
-            *cell = noise::noise(kind, &at, channel as u32).to_bits();
+            *cell = noise::noise(kind, &at, channel as u32)[0].to_bits();
         }
         out
     }

@@ -5,6 +5,7 @@
 //! reads is dropped, and what remains is a list of register instructions that [`Program::shade`] runs at a point.
 //! This module knows closures by their signatures only; what a lobe does with light is never seen here.
 
+mod batch;
 pub(crate) mod body;
 pub(crate) mod builtins;
 mod check;
@@ -19,7 +20,9 @@ mod program;
 mod shader;
 pub(crate) mod tasks;
 mod types;
+mod wide;
 
+pub use batch::Batch;
 pub use body::GlobalVar;
 pub(crate) use host::Answers;
 pub use host::{Host, Lookup, Speech, Subject};

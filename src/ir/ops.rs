@@ -5,6 +5,12 @@ use super::body::{Cells, Op};
 
 /// The value of an operation that touches no closure; `n` is the number of components of its operands.
 pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
+    value(op, n, a, b, c)
+}
+
+/// [`apply`], for places that know the operation while they are compiled.
+#[inline(always)]
+fn value(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
     let float = || {
         let mut out = [0; 3];
         for k in 0..n {
@@ -97,6 +103,21 @@ pub fn scalar(op: Op, a: u32, b: u32) -> u32 {
         Op::LtF | Op::LeF | Op::GtF | Op::GeF => u32::from(compare(op, x, y)),
         _ => apply(op, 1, [a, 0, 0], [b, 0, 0], [0; 3])[0],
     }
+}
+
+/// [`scalar`] in every lane.
+#[inline]
+pub fn wide<const L: usize>(op: Op, a: &[u32; L], b: &[u32; L]) -> [u32; L] {
+    // The operation is decided once, not per lane.
+    macro_rules! wide {
+        ($($known:ident)*) => {
+            match op {
+                $( Op::$known => std::array::from_fn(|l| value(Op::$known, 1, [a[l], 0, 0], [b[l], 0, 0], [0; 3])[0]), )*
+                _ => std::array::from_fn(|l| scalar(op, a[l], b[l])),
+            }
+        };
+    }
+    wide!(NegF AddF SubF MulF DivF LtF LeF GtF GeF EqF NeF TruthF IntToFloat NotI AddI SubI MulI LtI LeI GtI GeI EqI NeI)
 }
 
 /// [`apply`] for arithmetic on the components of triples.
