@@ -5,6 +5,7 @@ use overcoat::{Engine, Globals, Material};
 
 const VELVET: &str = include_str!("../examples/velvet.osl");
 
+const GENERATED: &str = include_str!("../tests/corpus/osl/standard_surface.osl");
 const VARYING: &str = "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);";
 
 /// Four octaves of Perlin noise in a loop; a branch drives color and roughness.
@@ -61,6 +62,12 @@ fn compile_velvet(bencher: Bencher) {
 fn compile_500_lines(bencher: Bencher) {
     let text = long();
     bencher.bench(|| Engine::new().compile("long", black_box(&text)));
+}
+
+/// A generated material: 240 lines of its own after 300 of operators.
+#[divan::bench]
+fn compile_standard_surface(bencher: Bencher) {
+    bencher.bench(|| Engine::new().compile("woven", black_box(GENERATED)));
 }
 
 #[divan::bench]

@@ -23,7 +23,7 @@ fn points(count: usize) -> Vec<Globals> {
         u: 0.5 + 0.5 * wave(k, 0.7),
         v: 0.5 + 0.5 * wave(k, 1.1),
         time: wave(k, 1.3),
-        backfacing: k % 3 == 0,
+        backfacing: k.is_multiple_of(3),
         ..Globals::default()
     };
     (0..count).map(point).collect()

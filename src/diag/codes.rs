@@ -92,8 +92,7 @@ pub const CODES: &[Code] = &[
     code(
         "E0202",
         "a name is declared twice",
-        "A block can declare a name once. Parameters of a shader cannot have the names of globals such as `P` or `u`, and no\n\
-         variable that of a reserved word such as `char`.",
+        "A block can declare a name once. Parameters of a shader cannot have the names of globals such as `P` or `u`.",
     ),
     code(
         "E0203",
@@ -208,7 +207,8 @@ pub const CODES: &[Code] = &[
     code(
         "W0506",
         "a function is not quite what its name says",
-        "The function runs, but not quite as its name says: derivatives are zero, because points are shaded one by one.",
+        "The function runs, but not quite as its name says: derivatives are zero where the\n\
+         host gives none.",
     ),
     code(
         "W0702",

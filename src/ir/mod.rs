@@ -58,8 +58,12 @@ pub fn compile_with(
     host: Option<Arc<dyn Host>>,
 ) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
     let ast = crate::syntax::parse_with(name, source, options).map_err(|(d, sources)| placed(d, &sources))?;
-    match check::check(name, &ast, hosts, &options.limits) {
-        Ok((checked, warnings)) => Ok((CheckedShader { host, ..checked }, placed(warnings, &ast.sources))),
+    let answers = Answers::of(host.as_deref());
+    match check::check(name, &ast, hosts, &options.limits, answers) {
+        Ok((checked, warnings)) => {
+            let (body, shadows) = passes::derive::derive(checked.body, answers.on(Subject::Derivatives));
+            Ok((CheckedShader { host, body, shadows, ..checked }, placed(warnings, &ast.sources)))
+        }
         Err(errors) => Err(placed(errors, &ast.sources)),
     }
 }

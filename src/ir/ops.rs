@@ -5,12 +5,6 @@ use super::body::{Cells, Op};
 
 /// The value of an operation that touches no closure; `n` is the number of components of its operands.
 pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
-    value(op, n, a, b, c)
-}
-
-/// [`apply`], for places that know the operation while they are compiled.
-#[inline(always)]
-fn value(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
     let float = || {
         let mut out = [0; 3];
         for k in 0..n {
@@ -100,24 +94,34 @@ pub fn scalar(op: Op, a: u32, b: u32) -> u32 {
         Op::AddF => arithmetic(Op::AddF, x, y).to_bits(),
         Op::SubF => arithmetic(Op::SubF, x, y).to_bits(),
         Op::MulF => arithmetic(Op::MulF, x, y).to_bits(),
+        Op::DivF => arithmetic(Op::DivF, x, y).to_bits(),
         Op::LtF | Op::LeF | Op::GtF | Op::GeF => u32::from(compare(op, x, y)),
         _ => apply(op, 1, [a, 0, 0], [b, 0, 0], [0; 3])[0],
     }
 }
 
 /// [`scalar`] in every lane.
-#[inline]
+#[inline(always)]
 pub fn wide<const L: usize>(op: Op, a: &[u32; L], b: &[u32; L]) -> [u32; L] {
-    // The operation is decided once, not per lane.
+    // What is frequent is decided once, not per lane.
     macro_rules! wide {
         ($($known:ident)*) => {
             match op {
-                $( Op::$known => std::array::from_fn(|l| value(Op::$known, 1, [a[l], 0, 0], [b[l], 0, 0], [0; 3])[0]), )*
-                _ => std::array::from_fn(|l| scalar(op, a[l], b[l])),
+                $( Op::$known => each(a, b, #[inline(always)] |a, b| scalar(Op::$known, a, b)), )*
+                _ => each(a, b, |a, b| scalar(op, a, b)),
             }
         };
     }
-    wide!(NegF AddF SubF MulF DivF LtF LeF GtF GeF EqF NeF TruthF IntToFloat NotI AddI SubI MulI LtI LeI GtI GeI EqI NeI)
+    wide!(AddF SubF MulF DivF LtF LeF GtF GeF)
+}
+
+#[inline(always)]
+fn each<const L: usize>(a: &[u32; L], b: &[u32; L], f: impl Fn(u32, u32) -> u32) -> [u32; L] {
+    let mut out = [0; L];
+    for l in 0..L {
+        out[l] = f(a[l], b[l]);
+    }
+    out
 }
 
 /// [`apply`] for arithmetic on the components of triples.
@@ -134,6 +138,7 @@ pub fn componentwise(op: Op, a: Cells, b: Cells) -> Cells {
 }
 
 /// Division where anything by zero is zero, as OSL has it.
+#[inline(always)]
 pub fn divide(a: f32, b: f32) -> f32 {
     if b == 0.0 { 0.0 } else { a / b }
 }

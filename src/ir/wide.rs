@@ -82,7 +82,27 @@ pub fn run(
     wide.errors
 }
 
+/// The cells of a row as floats. (A loop: `map` is a call.)
+#[inline(always)]
+fn floats(row: &Row) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
+    for l in 0..LANES {
+        out[l] = f32::from_bits(row[l]);
+    }
+    out
+}
+
+#[inline(always)]
+fn bits(values: &[f32; LANES]) -> Row {
+    let mut out = [0; LANES];
+    for l in 0..LANES {
+        out[l] = values[l].to_bits();
+    }
+    out
+}
+
 /// The lanes of a set.
+#[inline(always)]
 fn each(mut lanes: Lanes) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = (lanes != 0).then(|| lanes.trailing_zeros() as usize)?;
@@ -133,6 +153,9 @@ impl Wide<'_> {
                     if self.live == 0 {
                         (at, meet) = self.next();
                     }
+                }
+                Instr::Lobe { .. } | Instr::AddC { .. } | Instr::MulC { .. } | Instr::Layer { .. } => {
+                    self.compose(*instr);
                 }
                 _ => self.by_lane(*instr),
             }
@@ -248,15 +271,15 @@ impl Wide<'_> {
         let regs = &self.program.args[args as usize..];
         let mut at = noise::At { x: [[0.0; LANES]; 4], n, period: [[0.0; LANES]; 4] };
         for (x, reg) in at.x.iter_mut().zip(&regs[..n]) {
-            *x = self.cells[*reg as usize].map(f32::from_bits);
+            *x = floats(&self.cells[*reg as usize]);
         }
         if periodic {
             for (period, reg) in at.period.iter_mut().zip(&regs[n..2 * n]) {
-                *period = self.cells[*reg as usize].map(f32::from_bits);
+                *period = floats(&self.cells[*reg as usize]);
             }
         }
         for channel in 0..u32::from(width) {
-            self.put(dst + channel, noise::noise(kind as usize, &at, channel).map(f32::to_bits));
+            self.put(dst + channel, bits(&noise::noise(kind as usize, &at, channel)));
         }
     }
 
@@ -264,11 +287,13 @@ impl Wide<'_> {
         let Instr::Call { function, width, count, dst, args } = instr else { return };
         let builtin = &BUILTINS[function as usize];
         let pairs = &self.program.args[args as usize..][..2 * count as usize];
-        let float = f32::from_bits;
         for k in 0..width as usize {
-            let row = |i: usize| self.cells[pairs[2 * i] as usize + k].map(float);
+            let row = |i: usize| floats(&self.cells[pairs[2 * i] as usize + k]);
             let value: Row = match builtin.eval {
-                Eval::F1(f) => row(0).map(|x| f(x).to_bits()),
+                Eval::F1(f) => {
+                    let a = row(0);
+                    std::array::from_fn(|l| f(a[l]).to_bits())
+                }
                 Eval::F2(f) => {
                     let (a, b) = (row(0), row(1));
                     std::array::from_fn(|l| f(a[l], b[l]).to_bits())
@@ -338,30 +363,40 @@ impl Wide<'_> {
                     let mut around = Surroundings { strings: &mut self.strings, host, globals: &self.points[lane] };
                     run_deed(&self.program.deeds[deed as usize], cells, lane, &mut around);
                 }
-                _ => self.compose(instr, lane),
+                _ => {}
             }
         }
     }
 
-    /// Makes a node.
-    fn compose(&mut self, instr: Instr, lane: usize) {
-        let (cells, tree) = (&*self.cells, &mut self.trees[lane]);
-        let closure = |reg: u32| self.closures[reg as usize][lane];
-        let (dst, made) = match instr {
+    /// Makes a node in the tree of each lane.
+    fn compose(&mut self, instr: Instr) {
+        let Wide { cells, closures, trees, program, live, .. } = self;
+        match instr {
             Instr::Lobe { site, dst } => {
-                let maker = &self.program.makers[site as usize];
-                let open = maker.open.iter().map(|(slot, reg)| (*slot, f32::from_bits(cells[*reg as usize][lane])));
-                (dst, tree.lobe_from(maker.kind, site, &maker.known, open))
+                let maker = &program.makers[site as usize];
+                let target = &mut closures[dst as usize];
+                for lane in each(*live) {
+                    let open = maker.open.iter().map(|(slot, reg)| (*slot, f32::from_bits(cells[*reg as usize][lane])));
+                    target[lane] = trees[lane].lobe_from(maker.kind, site, &maker.known, open);
+                }
             }
-            Instr::AddC { dst, a, b } => (dst, tree.add(closure(a), closure(b))),
-            Instr::MulC { dst, weight, closure: c } => {
-                let weight = read(cells, lane, weight, 3).map(f32::from_bits);
-                (dst, tree.mul(weight, closure(c)))
+            Instr::AddC { dst, a, b } => {
+                let (a, b) = (closures[a as usize], closures[b as usize]);
+                each(*live).for_each(|l| closures[dst as usize][l] = trees[l].add(a[l], b[l]));
             }
-            Instr::Layer { dst, top, base } => (dst, tree.layer(closure(top), closure(base))),
-            _ => return,
-        };
-        self.closures[dst as usize][lane] = made;
+            Instr::MulC { dst, weight, closure } => {
+                let closure = closures[closure as usize];
+                for lane in each(*live) {
+                    let weight = [0, 1, 2].map(|k| f32::from_bits(cells[weight as usize + k][lane]));
+                    closures[dst as usize][lane] = trees[lane].mul(weight, closure[lane]);
+                }
+            }
+            Instr::Layer { dst, top, base } => {
+                let (top, base) = (closures[top as usize], closures[base as usize]);
+                each(*live).for_each(|l| closures[dst as usize][l] = trees[l].layer(top[l], base[l]));
+            }
+            _ => {}
+        }
     }
 }
 

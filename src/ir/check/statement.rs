@@ -11,40 +11,6 @@ use crate::diag::Diagnostic;
 use crate::span::Span;
 use crate::syntax::ast::{self, Sym};
 
-/// Words that OSL's compilers keep for themselves. (The specification lists a few more; compilers let them pass.)
-const RESERVED: &[&str] = &[
-    "bool",
-    "case",
-    "char",
-    "class",
-    "const",
-    "default",
-    "double",
-    "enum",
-    "extern",
-    "false",
-    "friend",
-    "inline",
-    "long",
-    "private",
-    "protected",
-    "public",
-    "short",
-    "signed",
-    "sizeof",
-    "static",
-    "switch",
-    "template",
-    "this",
-    "true",
-    "typedef",
-    "uniform",
-    "union",
-    "unsigned",
-    "varying",
-    "virtual",
-];
-
 /// Whether a statement leaves the loop or function it stands in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Flow {
@@ -379,11 +345,6 @@ impl Checker<'_> {
         {
             let d = Diagnostic::error("E0202", span, format!("`{text}` is declared twice"));
             self.diagnostics.push(d.label(earlier.span, "first here").help("give one of them another name"));
-            return None;
-        }
-        if RESERVED.contains(&text) {
-            let d = Diagnostic::error("E0202", span, format!("`{text}` is a reserved word of OSL"));
-            self.diagnostics.push(d.help("give the variable another name"));
             return None;
         }
         // Locals may hide globals, as in OSL; parameters of the shader may not.

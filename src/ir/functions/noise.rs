@@ -31,7 +31,10 @@ pub fn noise<const L: usize>(kind: usize, at: &At<L>, channel: u32) -> [f32; L] 
         // The others are not to notice.
         return if L == 1 { [0.0; L] } else { at.each(|one| noise(kind, one, channel)) };
     }
-    let half = |x: [f32; L]| x.map(|x| 0.5 + 0.5 * x);
+    let half = |mut x: [f32; L]| {
+        x.iter_mut().for_each(|x| *x = 0.5 + 0.5 * *x);
+        x
+    };
     match kind {
         2 | 3 => perlin(at, channel),
         4 => at.each(|one| [unit(hash(&one.cells(), at.n, channel))]),
@@ -193,9 +196,12 @@ fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; 
     let (mut shares, mut offsets, mut fade) = ([[[0u32; L]; 2]; N], [[[0.0f32; L]; 2]; 4], [[0.0f32; L]; N]);
     for d in 0..N {
         let (cells, t) = at.around(d);
-        shares[d] = cells.map(|row| row.map(|cell| share_of(cell, d)));
-        offsets[d] = [t, t.map(|t| t - 1.0)];
-        fade[d] = t.map(|t| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
+        for l in 0..L {
+            let t = t[l];
+            (shares[d][0][l], shares[d][1][l]) = (share_of(cells[0][l], d), share_of(cells[1][l], d));
+            (offsets[d][0][l], offsets[d][1][l]) = (t, t - 1.0);
+            fade[d][l] = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+        }
     }
     // Bit d of a corner's number is its step along coordinate d.
     let seed = seed(N, channel);
@@ -220,7 +226,9 @@ fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; 
     }
     // What brings it to ±1: at the middle of a cell all corners' gradients may agree.
     let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
-    values[0].map(|x| (x / largest).clamp(-1.0, 1.0))
+    let mut out = values[0];
+    out.iter_mut().for_each(|x| *x = (*x / largest).clamp(-1.0, 1.0));
+    out
 }
 
 fn simplex(at: &At<1>, channel: u32) -> [f32; 1] {
