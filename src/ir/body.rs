@@ -49,7 +49,7 @@ pub struct Root {
 }
 
 macro_rules! globals {
-    ($( $name:ident $text:literal $ty:ident $read:expr ),* $(,)?) => {
+    ($( $name:ident $text:literal $ty:ident |$g:ident| $read:expr ),* $(,)?) => {
         /// What the host tells about the shading point, as scripts name it.
         #[allow(missing_docs)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -72,7 +72,7 @@ macro_rules! globals {
             /// Its value at a point.
             #[inline]
             pub fn read(self, globals: &Globals) -> Cells {
-                match self { $( GlobalVar::$name => ($read as fn(&Globals) -> Cells)(globals) ),* }
+                match self { $( GlobalVar::$name => { let $g = globals; $read } ),* }
             }
         }
     };
