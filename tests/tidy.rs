@@ -141,6 +141,10 @@ fn unsafe_code_stands_in_the_c_interface_with_its_reason() {
             assert!(reason, "src/{file}:{}: {line}", number + 1);
         }
         let declared = words.matches("unsafe extern \"C\" fn oc_").count() + words.matches("unsafe fn ").count();
-        assert_eq!(words.matches("/// # Safety").count(), declared, "src/{file}: functions that do not say what they need");
+        assert_eq!(
+            words.matches("/// # Safety").count(),
+            declared,
+            "src/{file}: functions that do not say what they need"
+        );
     }
 }
