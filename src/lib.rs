@@ -53,6 +53,8 @@
 
 pub mod albedo;
 pub mod audit;
+#[cfg(feature = "capi")]
+pub mod capi;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod closure;
@@ -62,7 +64,7 @@ pub mod globals;
 pub mod ir;
 pub mod lobes;
 pub mod optics;
-#[cfg(feature = "cli")]
+#[cfg(feature = "preview")]
 pub mod preview;
 pub mod prove;
 pub mod span;

@@ -54,7 +54,7 @@ impl<S: Scalar> Sample<S> {
 }
 
 /// Cosine beyond which two directions are one.
-const SAME: f64 = 1.0 - 1e-6;
+const SAME: f64 = 1.0 - 2e-6;
 
 impl<S: Scalar> Bsdf<'_, S> {
     /// Every kind of scattering that some lobe may show, as seen from its own side of its own normal.

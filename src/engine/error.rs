@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// assert!(albedo("Ci = diffuse(N);").is_ok());
 /// let error = albedo("Ci =\n  difuse(N);").unwrap_err();
 /// let place = &error.places()[0];
-/// assert_eq!((place.file.as_str(), place.at.line, place.at.column, place.code), ("cloth.osl", 2, 3, "E0208"));
+/// assert_eq!((place.file.as_str(), place.at.line, place.at.column, place.code), ("cloth.osl", 2, 3, "E0206"));
 /// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]

@@ -119,7 +119,8 @@ pub trait Host: Send + Sync {
         false
     }
 
-    /// Color and alpha of a picture; `None` if it is missing.
+    /// Color and alpha of a picture; `None` if it is missing. Linear RGB with the primaries the renderer works in: decode
+    /// what is stored otherwise (8 bits are sRGB unless [`Lookup::colorspace`] says so); numbers are not changed after this.
     fn texture(&self, lookup: &Lookup, globals: &Globals) -> Option<[f32; 4]> {
         let _ = (lookup, globals);
         None

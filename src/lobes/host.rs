@@ -12,6 +12,7 @@ use super::{LobeKind, Rgb, Rgb32, Sides};
 use crate::optics::{Lift, Real, V3, sampling};
 use std::fmt;
 use std::hash::{Hash, Hasher};
+use std::sync::{Mutex, PoisonError};
 
 /// What a host's lobe does with light.
 ///
@@ -242,7 +243,11 @@ impl HostKind {
             reciprocal: spec.reciprocal,
             class: LobeClass::Scatter,
         };
-        Ok(HostKind(Box::leak(Box::new(HostClosure { spec: spec_of, most: spec.most, lobe }))))
+        /// So that tools that look for leaks find all of them held.
+        static KEPT: Mutex<Vec<HostKind>> = Mutex::new(Vec::new());
+        let kind = HostKind(Box::leak(Box::new(HostClosure { spec: spec_of, most: spec.most, lobe })));
+        KEPT.lock().unwrap_or_else(PoisonError::into_inner).push(kind);
+        Ok(kind)
     }
 
     /// Its declaration.

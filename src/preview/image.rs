@@ -37,6 +37,11 @@ impl Image {
         &self.data
     }
 
+    /// All values, as [`data`](Self::data) gives them.
+    pub fn into_data(self) -> Vec<f32> {
+        self.data
+    }
+
     /// One pixel; (0, 0) is the upper left corner.
     ///
     /// # Panics

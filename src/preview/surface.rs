@@ -62,8 +62,6 @@ impl Scatter for Bsdf<'_> {
         Bsdf::emission(self)
     }
     fn straight(&self) -> Rgb32 {
-        let wo = Vec3::from(self.wo());
-        let parts = self.delta_parts().filter(|(wi, _)| goes_straight(wo, Vec3::from(*wi)));
-        parts.fold([0.0; 3], |sum, (_, part)| std::array::from_fn(|c| sum[c] + part[c]))
+        self.transparency()
     }
 }
