@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Stack, at, block, blocks};
+use common::{Stack, at, block, blocks, turned};
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::{Side, Tolerance, albedo, chi2, reciprocity_error};
 use overcoat::closure::ClosureTree;
@@ -22,12 +22,6 @@ fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Stack<S> {
 /// Every lobe with a spread of parameter blocks.
 fn instances() -> impl Iterator<Item = (LobeKind, Vec<f32>)> {
     LobeKind::ALL.iter().flat_map(|k| blocks(*k).into_iter().map(move |b| (*k, b)))
-}
-
-/// Off the axes, so that no azimuth is special.
-fn turned(cos: f64) -> [f32; 3] {
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    [(sin * 0.8) as f32, (sin * 0.6) as f32, cos as f32]
 }
 
 #[test]

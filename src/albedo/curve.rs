@@ -4,6 +4,7 @@
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
 //! nodes around each, so that it never lies below either.
 
+use super::facets::FacetTables;
 use super::fibre::FibreTables;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
@@ -102,6 +103,8 @@ pub struct AlbedoCurve<S> {
     inv_range: S,
     /// For lobes that follow a thread; empty for all others.
     pub(super) fibre: FibreTables<S>,
+    /// For rough surfaces; empty for all others.
+    pub(super) facets: FacetTables<S>,
 }
 
 impl<S> Default for AlbedoCurve<S>
@@ -120,6 +123,7 @@ where
             lo: S::zero(),
             inv_range: S::zero(),
             fibre: FibreTables::default(),
+            facets: FacetTables::default(),
         }
     }
 }
@@ -154,12 +158,19 @@ impl<S: Real> AlbedoCurve<S> {
     pub fn bytes(&self) -> usize {
         (self.view.len() + self.bound.len() + self.excess.len() + self.extra.len()) * size_of::<S>()
             + self.fibre.bytes()
+            + self.facets.bytes()
     }
 
     /// The tables of a lobe that follows a thread.
     #[inline(always)]
     pub fn fibre(&self) -> &FibreTables<S> {
         &self.fibre
+    }
+
+    /// The tables of a rough surface.
+    #[inline(always)]
+    pub fn facets(&self) -> &FacetTables<S> {
+        &self.facets
     }
 
     #[inline(always)]
@@ -229,6 +240,7 @@ impl CurveSpec {
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
             fibre: FibreTables::default(),
+            facets: FacetTables::default(),
         };
         let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos).bound();
         let lifts = shortfalls(&curve, truth, parameter, cosine);

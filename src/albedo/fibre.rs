@@ -10,6 +10,7 @@
 //! measured between the nodes.
 
 use super::curve::{AlbedoCurve, CurveSpec, Precision, parallel};
+use super::facets::FacetSpec;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -60,6 +61,8 @@ pub enum TableSpec {
     Cosine(CurveSpec),
     /// Around a thread.
     Fibre(FibreSpec),
+    /// Of rough surfaces.
+    Facets(FacetSpec),
 }
 
 impl TableSpec {
@@ -70,6 +73,11 @@ impl TableSpec {
             TableSpec::Fibre(spec) => {
                 let mut curve = AlbedoCurve::default();
                 curve.fibre = spec.bake(precision);
+                curve
+            }
+            TableSpec::Facets(spec) => {
+                let mut curve = AlbedoCurve::default();
+                curve.facets = spec.bake(precision);
                 curve
             }
         }

@@ -4,8 +4,10 @@
 //! name.
 
 pub mod curve;
+pub mod facets;
 pub mod fibre;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
+pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
 pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, TableSpec};

@@ -78,6 +78,49 @@ pub fn integrate(cells: &[[f64; 4]], tolerance: Tolerance, mut f: impl FnMut(f64
     }
 }
 
+/// Splits `cells` until none holds more than `most` of the `points` (where a peak too narrow to be found was sampled).
+pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f64; 4]> {
+    let inside = |c: &[f64; 4], p: &[f64; 2]| (c[0]..c[1]).contains(&p[0]) && (c[2]..c[3]).contains(&p[1]);
+    let mut open: Vec<([f64; 4], Vec<[f64; 2]>)> =
+        cells.iter().map(|c| (*c, points.iter().copied().filter(|p| inside(c, p)).collect())).collect();
+    let mut done = Vec::new();
+    while let Some((cell, mut points)) = open.pop() {
+        let ends = |axis: usize| {
+            let of = points.iter().map(|p| p[axis]);
+            of.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+        };
+        let spread = |axis: usize| (ends(axis).1 - ends(axis).0) / (cell[2 * axis + 1] - cell[2 * axis]);
+        // Across the direction in which the points lie closest together, measured in the cell.
+        let axis = usize::from(points.len() > 1 && spread(1) < spread(0));
+        let (lo, hi) = (cell[2 * axis], cell[2 * axis + 1]);
+        let (first, last) = ends(axis);
+        // A little at a time, so that the flanks of the peak get cells of their own.
+        let reach = (last - first).max(0.125 * (hi - lo));
+        let at = if points.len() < 2 {
+            None
+        } else if first - lo > 2.0 * reach {
+            // What is empty is cut off.
+            Some(first - reach)
+        } else if hi - last > 2.0 * reach {
+            Some(last + reach)
+        } else {
+            points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+            let middle = points[points.len() / 2][axis];
+            (points.len() > most && middle > lo).then_some(middle)
+        };
+        let Some(at) = at else {
+            done.push(cell);
+            continue;
+        };
+        let (mut below, mut above) = (cell, cell);
+        (below[2 * axis + 1], above[2 * axis]) = (at, at);
+        let (under, over) = points.into_iter().partition(|p| p[axis] < at);
+        open.push((below, under));
+        open.push((above, over));
+    }
+    done
+}
+
 struct Cell {
     corners: [f64; 4],
     value: [f64; 3],
@@ -167,6 +210,23 @@ mod tests {
         });
         approx::assert_abs_diff_eq!(i.value[0], 2.0 * (1.0 + 0.09 / 3.0), epsilon = 1e-4);
         approx::assert_abs_diff_eq!(i.value[1], std::f64::consts::PI * 0.25, epsilon = 2e-3);
+    }
+
+    #[test]
+    fn a_peak_is_found_where_points_show_it() {
+        let peak = |x: f64, y: f64| {
+            let r2 = (x - 0.31).powi(2) + (y - 0.77).powi(2);
+            [(-r2 / 1e-8).exp() / (1e-8 * std::f64::consts::PI), 0.0, 0.0]
+        };
+        let unit = [[0.0, 1.0, 0.0, 1.0]];
+        assert!(integrate(&unit, Tolerance::default(), peak).value[0] < 1e-3, "found without help");
+        let spiral = |k: usize| (2e-5 * (k as f64).sqrt(), 2.4 * k as f64);
+        let points: Vec<[f64; 2]> =
+            (0..64).map(spiral).map(|(r, a)| [0.31 + r * a.cos(), 0.77 + r * a.sin()]).collect();
+        let cells = split_at(&unit, &points, 4);
+        let area: f64 = cells.iter().map(|c| (c[1] - c[0]) * (c[3] - c[2])).sum();
+        approx::assert_abs_diff_eq!(area, 1.0, epsilon = 1e-12);
+        approx::assert_abs_diff_eq!(integrate(&cells, Tolerance::default(), peak).value[0], 1.0, epsilon = 1e-5);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! Each lobe is integrated in its own frame, where its horizon is an edge of the domain; delta lobes are added
 //! exactly.
 
-use super::cubature::{Integral, Tolerance, integrate};
+use super::cubature::{Integral, Tolerance, integrate, split_at};
 use super::{Subject, dot};
 use crate::closure::Bsdf;
 use crate::lobes::Rgb;
@@ -41,10 +41,11 @@ impl Albedo {
 pub fn albedo<'m, S: Scalar>(subject: &impl Subject<'m, S>, side: Side, w: [S; 3], tolerance: Tolerance) -> Albedo {
     let held = subject.bsdf(w);
     let normals = distinct_normals(&held);
+    let hints = hints(&held);
     let mut total = Albedo { value: [0.0; 3], error: 0.0 };
     let share = Tolerance { error: tolerance.error / normals.len().max(1) as f64, ..tolerance };
     for (group, frame) in normals.iter().enumerate() {
-        let part = over_sphere(frame, w, share, |moving| match side {
+        let part = over_sphere(frame, w, &hints, share, |moving| match side {
             Side::View => held.part(moving, false, |n| group_of(&normals, n) == group),
             Side::Light => {
                 subject.bsdf([moving.x, moving.y, moving.z]).part(vector(w), true, |n| group_of(&normals, n) == group)
@@ -76,13 +77,14 @@ pub struct LobeShare {
 /// Where the energy goes, lobe by lobe, for ωo = `w`.
 pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolerance: Tolerance) -> Vec<LobeShare> {
     let bsdf = subject.bsdf(w);
+    let hints = hints(&bsdf);
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let frame = bsdf.lobe_frame(lobe);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
-                    let i = over_sphere(frame, w, tolerance, |wi| bsdf.lobe_part(lobe, wi, layered));
+                    let i = over_sphere(frame, w, &hints, tolerance, |wi| bsdf.lobe_part(lobe, wi, layered));
                     Albedo { value: i.value, error: i.error }
                 }
             };
@@ -91,11 +93,22 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
         .collect()
 }
 
+/// Directions that light from (or toward) the held direction goes to: where to look for peaks.
+fn hints<S: Scalar>(held: &Bsdf<'_, S>) -> Vec<[S; 3]> {
+    let sample = |k: usize| {
+        // A rank-1 lattice in three dimensions.
+        let u = [0.819_172_5, 0.671_043_6, 0.549_700_5].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
+        held.sample(u).filter(|s| !s.flags.delta).map(|s| s.wi)
+    };
+    (0..64).filter_map(sample).collect()
+}
+
 /// ∫ over the sphere about `frame`, graded toward its horizon and split where `held` puts edges: at its azimuth, at
-/// right angles to it, and at its own polar angle, where the two α of a layer meet.
+/// right angles to it, at its own polar angle, where the two α of a layer meet, and among the `hints`.
 pub(crate) fn over_sphere<S: Scalar>(
     frame: &Frame<S>,
     held: [S; 3],
+    hints: &[[S; 3]],
     tolerance: Tolerance,
     mut f: impl FnMut(V3<S>) -> Rgb<S>,
 ) -> Integral {
@@ -112,7 +125,13 @@ pub(crate) fn over_sphere<S: Scalar>(
             cell(side * split, side);
         }
     }
-    integrate(&cells, tolerance, |u, phi| {
+    let place = |hint: &[S; 3]| {
+        let local = frame.to_local(vector(*hint)).map(|x| x.to_f64());
+        let turn = (local.y.atan2(local.x) - azimuth + PI).rem_euclid(2.0 * PI);
+        [local.z.abs().sqrt().copysign(local.z), turn]
+    };
+    let points: Vec<[f64; 2]> = hints.iter().map(place).collect();
+    integrate(&split_at(&cells, &points, 4), tolerance, |u, phi| {
         // z = ±u²: dz = 2|u| du.
         let z = u * u.abs();
         let (sin, phi) = ((1.0 - z * z).max(0.0).sqrt(), phi + azimuth - PI);

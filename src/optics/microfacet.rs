@@ -98,7 +98,7 @@ impl<S: Real> Facets<S> {
     /// the proposal's ℓ(ωo).
     #[inline(always)]
     pub fn mirrored_pdf<L: Real + Lift<S>>(&self, h: V3<L>, cos_o: L, reach_o: L) -> L {
-        self.proposal().d(h) * L::c(0.5) / (cos_o + reach_o).max(L::c(1e-30))
+        self.proposal().d(h) * L::c(0.5) / (cos_o + reach_o).max(L::c(1e-18))
     }
 }
 

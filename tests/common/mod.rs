@@ -46,6 +46,12 @@ pub fn at<S: Scalar>(cos: f64) -> [S; 3] {
     [S::c((1.0 - cos * cos).max(0.0).sqrt()), S::zero(), S::c(cos)]
 }
 
+/// Off the axes, so that no azimuth is special.
+pub fn turned(cos: f64) -> [f32; 3] {
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    [(sin * 0.8) as f32, (sin * 0.6) as f32, cos as f32]
+}
+
 /// One lobe on its own, with N = +z and T = +x where it takes them.
 pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> NodeId {
     let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
@@ -90,7 +96,9 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         })
         .collect();
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
-    if choices.len() > 3 {
+    // Rough surfaces bake slowly, and their widths play alike parts.
+    let thin = choices.len() > 3 || free.iter().any(|p| p.name == "distribution");
+    if thin {
         // One at a time, the others at their defaults; and all at either end.
         let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
@@ -102,7 +110,7 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
             }));
         }
     }
-    for c in choices.iter().filter(|_| choices.len() <= 3) {
+    for c in choices.iter().filter(|_| !thin) {
         sets = sets.iter().flat_map(|s| c.iter().map(move |v| [s.as_slice(), &[*v]].concat())).collect();
     }
     let value = |set: &[f32], name: &str| free.iter().position(|f| f.name == name).map(|i| set[i]);
@@ -110,8 +118,12 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     sets.iter().map(|set| block(kind, |p| value(set, p.name))).collect()
 }
 
-/// Whether a sheen block differs from another only in a switch its model does not look at.
+/// Whether a block differs from another only in a switch its model does not look at.
 fn says_it_again(value: impl Fn(&str) -> Option<f32>) -> bool {
+    // Other names of "ggx".
+    if value("distribution").is_some_and(|d| d > 1.0) {
+        return true;
+    }
     let (Some(mode), Some(model), Some(softening)) = (value("mode"), value("model"), value("softening")) else {
         return false;
     };
