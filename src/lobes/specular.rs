@@ -151,7 +151,10 @@ impl<S: Real> Lobe<S> for Refraction<S> {
     }
 
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
-        self.part(w)
+        // Toward grazing the way back through the other medium keeps only half the digits of the cosine.
+        let cos = w.z.mul_add(w.z, L::c(4e-6)).sqrt().copysign(w.z);
+        let part = self.part(V3::new(w.x, w.y, cos))[0];
+        [L::select(w.z.abs().gt(L::zero()), part, L::zero()); 3]
     }
 
     fn relative_eta<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
