@@ -59,7 +59,10 @@ impl<S: Real> Facets<S> {
             Shape::Beckmann => {
                 // The exponential has long vanished where the ratio is capped.
                 let inv = L::one() / z2.max(length2 * L::c(1e-8)).max(L::c(1e-30));
-                L::lift(self.scale) * (length2 * inv).sq() * (-(slope2 * inv)).exp()
+                let steep = slope2 * inv;
+                let d = L::lift(self.scale) * (length2 * inv).sq() * (-steep).exp();
+                // Nothing is left there, and every precision says so alike.
+                L::select(steep.lt(L::c(60.0)), d, L::zero())
             }
         }
     }
