@@ -291,9 +291,13 @@ pub const CODES: &[(&str, &str)] = &[
     ("E0304", "a keyword argument is given twice or without a value"),
     ("E0401", "an unknown parameter"),
     ("E0402", "a value does not fit a parameter"),
+    ("E0701", "the material gains energy"),
     ("W0501", "`Ci` is never assigned"),
     ("W0502", "a statement without effect"),
     ("W0503", "a parameter lies outside its declared range"),
+    ("W0504", "the top of a layer transmits"),
+    ("W0702", "whether the material gains energy could not be decided"),
+    ("W0703", "a weight can be negative"),
 ];
 
 #[cfg(test)]

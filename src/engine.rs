@@ -10,6 +10,9 @@ use crate::closure::balance::Construction;
 use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
 use crate::diag::{Diagnostic, render_all};
 use crate::ir::{self, CheckedShader, GlobalVar, ParamDecl, Program, Value};
+use crate::lobes;
+use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
+use crate::lobes::registry::Form;
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use glam::Vec3;
@@ -38,7 +41,7 @@ impl Tier {
     }
 }
 
-/// Compiles scripts. Cheap to make and to copy.
+/// Compiles scripts. Cheap to make and to clone.
 ///
 /// ```
 /// use overcoat::{Engine, Globals};
@@ -48,10 +51,12 @@ impl Tier {
 /// assert!(bsdf.eval([0.0, 0.6, 0.8]).f_cos[0] > 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Engine {
     tier: Tier,
     layering: Layering,
+    /// Closures of the host, as scripts call them.
+    hosts: Arc<[Form]>,
 }
 
 impl Engine {
@@ -75,14 +80,55 @@ impl Engine {
         Engine { layering: Layering { tint, ..self.layering }, ..self }
     }
 
+    /// Lets scripts call a closure that the host brings along. It is kept until the process ends, so register once, not
+    /// per scene.
+    ///
+    /// ```
+    /// use overcoat::Engine;
+    /// use overcoat::lobes::host::{ClosureSpec, HostLobe};
+    ///
+    /// /// A flat fuzz: f = w/π on the normal's side.
+    /// struct Fuzz;
+    /// impl HostLobe for Fuzz {
+    ///     fn f(&self, values: &[f32], wo: [f64; 3], wi: [f64; 3]) -> [f64; 3] {
+    ///         let above = wo[2] > 0.0 && wi[2] > 0.0;
+    ///         [if above { f64::from(values[3]) / std::f64::consts::PI } else { 0.0 }; 3]
+    ///     }
+    ///     fn albedo_bound(&self, values: &[f32], w: [f64; 3]) -> [f64; 3] {
+    ///         [if w[2] > 0.0 { f64::from(values[3]) } else { 0.0 }; 3]
+    ///     }
+    /// }
+    ///
+    /// let spec = ClosureSpec::new("fuzz").normal("N", "Shading normal.").float("w", 0.5, 0.0..=1.0, "Albedo.");
+    /// let engine = Engine::new().register(spec, Fuzz)?;
+    /// let shader = engine.compile("dusty", "Ci = layer(fuzz(N, 0.3), diffuse(N));")?;
+    /// # let _ = shader;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the signature is malformed, or taken.
+    pub fn register(self, spec: ClosureSpec, lobe: impl HostLobe + 'static) -> Result<Self, RegisterError> {
+        let taken = lobes::forms().chain(self.hosts.iter().copied());
+        let kind = HostKind::register(spec, Box::new(lobe), taken)?;
+        let hosts = self.hosts.iter().copied().chain([kind.form()]).collect();
+        Ok(Engine { hosts, ..self })
+    }
+
+    pub(crate) fn layering_of(&self) -> Layering {
+        self.layering
+    }
+
     /// Compiles a script. `name` names it in messages, and the shader if the script does not.
     ///
     /// # Errors
     /// Everything that is wrong with the script, with its places.
     pub fn compile(&self, name: &str, text: &str) -> Result<Shader, ScriptError> {
         let source = Arc::new(Source::new(name, text));
-        match ir::compile(name, text) {
-            Ok((checked, warnings)) => Ok(Shader { engine: *self, source, checked: Arc::new(checked), warnings }),
+        match ir::compile_with(name, text, &self.hosts) {
+            Ok((checked, warnings)) => {
+                Ok(Shader { engine: self.clone(), source, checked: Arc::new(checked), warnings })
+            }
             Err(diagnostics) => Err(ScriptError { source, diagnostics }),
         }
     }
@@ -108,6 +154,14 @@ impl Shader {
         self.checked.params()
     }
 
+    pub(crate) fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    pub(crate) fn checked(&self) -> &CheckedShader {
+        &self.checked
+    }
+
     /// The script, for showing messages.
     pub fn source(&self) -> &Source {
         &self.source
@@ -127,20 +181,21 @@ impl Shader {
             .checked
             .specialise(set)
             .map_err(|diagnostics| ScriptError { source: self.source.clone(), diagnostics })?;
-        Ok(self.finished(program))
+        Ok(self.finished(program, set))
     }
 
     /// The material with every parameter left open, read at every point: what specialising is measured against.
     pub fn unspecialised(&self) -> Material {
-        self.finished(self.checked.unspecialised())
+        self.finished(self.checked.unspecialised(), &[])
     }
 
-    fn finished(&self, program: Program) -> Material {
+    fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
         let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
         let inner = Inner {
-            engine: self.engine,
+            engine: self.engine.clone(),
             name: self.name().to_owned(),
+            set: set.to_vec(),
             program,
             tables,
             baked_in: start.elapsed(),
@@ -164,6 +219,7 @@ pub struct Material {
 struct Inner {
     engine: Engine,
     name: String,
+    set: Vec<(String, Value)>,
     program: Program,
     tables: Baked<f32>,
     baked_in: Duration,
@@ -179,6 +235,16 @@ impl Material {
     /// The tier of the engine that made it.
     pub fn tier(&self) -> Tier {
         self.inner.engine.tier
+    }
+
+    /// How its layers scale.
+    pub fn layering(&self) -> Layering {
+        self.inner.engine.layering
+    }
+
+    /// The parameters that were set, and to what.
+    pub fn params(&self) -> &[(String, Value)] {
+        &self.inner.set
     }
 
     /// What looked wrong while specialising and is not an error.
@@ -216,6 +282,29 @@ impl Material {
     /// If the closure tree goes beyond a budget.
     pub fn shade_reference(&self, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'_, f64>, ShadeError> {
         self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_tables())
+    }
+
+    /// The BSDF of a tree made of this material's lobes, for example of a part of [`tree`](Self::tree), seen from `wo`.
+    /// The `balanced` rule is solved for whole materials; here it is `min`.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
+        flatten(tree, globals, V3::from_f32(wo.to_array()), self.inner.engine.layering, &self.inner.tables.curves)
+    }
+
+    /// [`flatten`](Self::flatten) in double precision.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn flatten_reference(
+        &self,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f64; 3],
+    ) -> Result<Bsdf<'_, f64>, ShadeError> {
+        let wo = V3::new(wo[0], wo[1], wo[2]);
+        flatten(tree, globals, wo, self.inner.engine.layering, &self.reference_tables().curves)
     }
 
     fn flattened<'m, S: Scalar>(
@@ -277,7 +366,7 @@ impl<S: Scalar> Baked<S> {
 
 /// Solves for the scales of the `balanced` rule.
 fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, precision: Precision) -> Balance<S> {
-    let mut balancer = Balancer::new(precision);
+    let balancer = Balancer::new(precision);
     if program.is_constant() {
         // Normals are told apart by the global they come from, so none may coincide here.
         let globals = Globals {
@@ -293,10 +382,10 @@ fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, pre
         return balancer.solve(&tree, &globals, tint, curves);
     }
     // Where the view changes the tree no scale is symmetric.
-    let pairs = if program.globals().contains(&GlobalVar::I) { vec![] } else { program.layer_pairs() };
+    let pairs = if program.globals().contains(&GlobalVar::I) { &[] } else { program.layer_pairs() };
     let sites = program.sites();
     let sites: Vec<_> = sites.iter().map(|s| Construction { kind: s.kind, values: &s.values }).collect();
-    balancer.solve_pairs(&sites, &pairs, tint, curves)
+    balancer.solve_pairs(&sites, pairs, tint, curves)
 }
 
 /// What is wrong with a script.

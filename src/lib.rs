@@ -64,6 +64,7 @@ pub mod lobes;
 pub mod optics;
 #[cfg(feature = "cli")]
 pub mod preview;
+pub mod prove;
 pub mod span;
 pub mod syntax;
 

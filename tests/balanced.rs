@@ -6,7 +6,7 @@ use common::at;
 use overcoat::audit::chi2::direction;
 use overcoat::audit::{Side, Tolerance, albedo, reciprocity_error};
 use overcoat::closure::balance::Balance;
-use overcoat::closure::{LayeringRule, TintRule, Unbalanced};
+use overcoat::closure::{Fate, LayeringRule, TintRule, Unbalanced};
 use overcoat::engine::Tier;
 use overcoat::{Engine, Globals, Material};
 use rand::SeedableRng;
@@ -169,26 +169,24 @@ fn bounds_hold() {
 
 #[test]
 fn what_cannot_be_balanced_keeps_min() {
-    let unbalanced = |script: &str| {
-        let found = material(LayeringRule::Balanced, script).balance().map(Balance::unbalanced).expect("balanced");
-        found.last().copied().flatten()
+    let fate = |script: &str| {
+        let fates = material(LayeringRule::Balanced, script).balance().map(Balance::fates).expect("balanced");
+        fates.last().expect("a lobe").1
     };
-    for (base, why) in [
-        ("diffuse(N)", None),
-        ("diffuse(Ng)", Some(Unbalanced::Normal)),
-        ("translucent(N)", Some(Unbalanced::Crosses)),
-        ("transparent()", Some(Unbalanced::Delta)),
-        ("fabric(N, dPdu, 0.3)", Some(Unbalanced::Tangent)),
-        ("sheen_bsdf(N, 1, 0.3)", Some(Unbalanced::NotReciprocal)),
-        ("emission()", None),
+    for (base, expected) in [
+        ("diffuse(N)", Fate::Balanced),
+        ("diffuse(Ng)", Fate::Min(Unbalanced::Normal)),
+        ("translucent(N)", Fate::Min(Unbalanced::Crosses)),
+        ("transparent()", Fate::Min(Unbalanced::Delta)),
+        ("fabric(N, dPdu, 0.3)", Fate::Min(Unbalanced::Tangent)),
+        ("sheen_bsdf(N, 1, 0.3)", Fate::Min(Unbalanced::NotReciprocal)),
+        ("emission()", Fate::Uncovered),
     ] {
-        assert_eq!(unbalanced(&format!("Ci = layer(velvet(N, 0.5), {base});")), why, "{base}");
+        assert_eq!(fate(&format!("Ci = layer(velvet(N, 0.5), {base});")), expected, "{base}");
     }
-    assert_eq!(unbalanced("Ci = layer(fabric(N, dPdu, 0.3), diffuse(N));"), Some(Unbalanced::Tangent));
-    assert_eq!(
-        unbalanced("Ci = layer(0.5 * velvet(N, 0.3) + 0.5 * velvet(Ng, 0.3), diffuse(N));"),
-        Some(Unbalanced::Normal)
-    );
+    assert_eq!(fate("Ci = layer(fabric(N, dPdu, 0.3), diffuse(N));"), Fate::Min(Unbalanced::Tangent));
+    let two_normals = "Ci = layer(0.5 * velvet(N, 0.3) + 0.5 * velvet(Ng, 0.3), diffuse(N));";
+    assert_eq!(fate(two_normals), Fate::Min(Unbalanced::Normal));
     // Bit for bit the same as `min`.
     let mut rng = Pcg64Mcg::seed_from_u64(4);
     for script in [

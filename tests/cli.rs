@@ -51,6 +51,22 @@ fn temporary(name: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
+fn tree_explains_its_layers() {
+    let script = "Ci = layer(velvet(N, 0.5), 0.5 * diffuse(N) + 0.5 * translucent(N));";
+    let explain =
+        |more: &[&str]| json(&[&["tree", "-", "--json", "--explain"], more].concat(), script)["layering"].clone();
+    assert_eq!(explain(&[]), serde_json::json!({ "rule": "min" }));
+    let balanced = explain(&["--layering", "balanced"]);
+    let rules: Vec<_> = balanced["lobes"].as_array().expect("lobes").iter().map(|l| l["rule"].clone()).collect();
+    assert_eq!(rules, ["balanced", "min"], "{balanced}");
+    let text = overcoat(&["tree", "-", "--explain", "--layering", "balanced"], script).stdout;
+    assert!(String::from_utf8_lossy(&text).contains("translucent: min: it scatters to the other side"));
+    let varying = "Ci = layer(u * velvet(N, 0.5), diffuse(N));";
+    let text = overcoat(&["tree", "-", "--explain", "--layering", "balanced"], varying).stdout;
+    assert!(String::from_utf8_lossy(&text).contains("diffuse below velvet: balanced"));
+}
+
+#[test]
 fn tree_has_the_promised_shape() {
     let tree = json(&["tree", "-", "--json"], VELVET);
     assert_eq!(tree["shader"], "stdin");

@@ -41,7 +41,8 @@ fn stack(kind: LobeKind, set: &[(&str, f32)], unknown: &[&str]) -> Stack<f32> {
     Stack::varying(tree, Precision::STANDARD, unknown)
 }
 
-/// Measures the albedo from both sides and holds it against 1 and against the bound; returns the largest.
+/// Measures the albedo from both sides and holds it against 1 and against the bound; returns the largest. These lobes
+/// are reciprocal, which `laws` holds exactly: from the light's side, dear to measure, a coarser rule would still tell.
 fn hold(kind: LobeKind, set: &[(&str, f32)], varying: &[&str], count: usize, rng: &mut Pcg64Mcg) -> f64 {
     let stack = stack(kind, set, varying);
     let mut largest = 0.0f64;
@@ -49,11 +50,16 @@ fn hold(kind: LobeKind, set: &[(&str, f32)], varying: &[&str], count: usize, rng
         let w = place(k, rng);
         let bound = stack.bsdf(w).albedo_bound(w);
         for side in [Side::View, Side::Light] {
-            let e = albedo(&|w| stack.bsdf(w), side, w, Tolerance { error: 1e-5, evaluations: 60_000 });
+            let tolerance = match side {
+                Side::View => Tolerance { error: 1e-5, evaluations: 60_000 },
+                Side::Light => Tolerance { error: 1e-4, evaluations: 6_000 },
+            };
+            let e = albedo(&|w| stack.bsdf(w), side, w, tolerance);
             let place = format!("{kind:?} {set:?}, unknown {varying:?}, {side:?} at {w:?}: {e:?}, bound {bound:?}");
-            assert!(e.max() <= 1.0001, "{place}");
+            let known = if side == Side::View { e.max() } else { e.max() - e.error };
+            assert!(known <= 1.0001, "{place}");
             assert!((0..3).all(|c| e.value[c] - e.error <= bound[c] as f64 + 1e-4), "{place}");
-            largest = largest.max(e.max());
+            largest = largest.max(known);
         }
     }
     largest
@@ -132,6 +138,43 @@ fn a_cloth_with_a_varying_preset_never_gains() {
     let mut rng = Pcg64Mcg::seed_from_u64(23);
     for preset in 0..5 {
         hold(LobeKind::Microcylinder, &[("preset", preset as f32)], &["preset"], 40, &mut rng);
+    }
+}
+
+/// Cloths from sharp, flat and pale to steep, dull and glassy.
+const CLOTHS: [&[(&str, f32)]; 5] = [
+    &[("A1", 1.0), ("A2", 1.0), ("offset1", 0.0), ("offset2", 0.0), ("gamma_s1", 2.0), ("gamma_v1", 2.0), ("kd1", 0.0)],
+    &[("A1", 1.0), ("A2", 1.0), ("eta1", 1.0), ("eta2", 3.0), ("a1", 1.0), ("a2", 1.0), ("gamma_v2", 2.0)],
+    &[("A1", 1.0), ("A2", 0.3), ("offset1", 60.0), ("offset2", 7.0), ("gamma_s1", 2.0), ("gamma_v1", 90.0)],
+    &[("A1", 1.0), ("A2", 1.0), ("offset1", 60.0), ("offset2", 60.0), ("eta1", 1.05), ("eta2", 1.05), ("a1", 0.9)],
+    &[("A1", 1.0), ("a1", 1.0), ("a2", 0.0), ("offset1", 3.0), ("gamma_s1", 4.0), ("gamma_v1", 8.0), ("kd1", 1.0)],
+];
+
+#[test]
+fn cloths_of_any_threads_never_gain() {
+    let mut rng = Pcg64Mcg::seed_from_u64(26);
+    for (set, unknown) in CLOTHS.iter().zip(["offset1", "eta1", "gamma_v1", "a1", "kd1"]) {
+        for unknown in [&[][..], &[unknown], &["A1", "A2"]] {
+            let largest = hold(LobeKind::MicrocylinderThreads, set, unknown, 6, &mut rng);
+            println!("{set:?}, unknown {unknown:?}: {largest:.5}");
+        }
+    }
+}
+
+/// Any values within their ranges, and the table or the closed forms.
+#[test]
+fn cloths_of_random_threads_never_gain() {
+    let mut rng = Pcg64Mcg::seed_from_u64(27);
+    for k in 0..6 {
+        let params = LobeKind::MicrocylinderThreads.spec().params.iter().skip(2);
+        // Ends as often as what lies between.
+        let mut pick = |lo: f32, hi: f32| match rng.random_range(0..4) {
+            0 => lo,
+            1 => hi,
+            _ => lo + (hi - lo) * rng.random::<f32>().powi(2),
+        };
+        let set: Vec<(&str, f32)> = params.map(|p| (p.name, pick(p.min, p.max))).collect();
+        hold(LobeKind::MicrocylinderThreads, &set, if k % 2 == 0 { &["gamma_s2"] } else { &[] }, 6, &mut rng);
     }
 }
 

@@ -370,6 +370,15 @@ fn parameters_are_declared_and_set() {
 }
 
 #[test]
+fn a_top_that_transmits_is_pointed_out() {
+    let codes = |source: &str| -> Vec<_> { program(source).warnings.iter().map(|w| w.code).collect() };
+    assert_eq!(codes("Ci = layer(velvet(N, 0.3), 0.5 * translucent(N) + transparent());"), [""; 0]);
+    let nested = "closure color t = layer(velvet(N, 0.3), 0.5 * transparent()); Ci = layer(0.5 * t, diffuse(N));";
+    assert_eq!(codes(nested), ["W0504"]);
+    assert_eq!(codes("Ci = layer(0.1 * translucent(N) + transparent(), diffuse(N));"), ["W0504"; 2]);
+}
+
+#[test]
 fn only_what_is_needed_is_kept() {
     let needs = |source: &str| {
         let program = program(source);

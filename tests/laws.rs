@@ -11,12 +11,24 @@ use overcoat::lobes::{AnyLobe, LobeKind, forms};
 use overcoat::optics::{F32x8, Scalar, V3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
-fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Stack<S> {
-    let mut tree = ClosureTree::new();
-    let lobe = tree.lobe(kind, 0, values);
-    tree.set_root(lobe);
-    Stack::new(tree, Precision::STANDARD)
+/// A lobe on its own; what is baked for one test serves the others.
+fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Arc<Stack<S>> {
+    type Shared = Arc<dyn Any + Send + Sync>;
+    type Key = (TypeId, &'static str, Vec<u32>);
+    static STACKS: LazyLock<Mutex<HashMap<Key, Arc<OnceLock<Shared>>>>> = LazyLock::new(Mutex::default);
+    let key = (TypeId::of::<S>(), kind.spec().name, values.iter().map(|v| v.to_bits()).collect());
+    let entry = STACKS.lock().expect("no test panics here").entry(key).or_default().clone();
+    let shared = entry.get_or_init(|| {
+        let mut tree = ClosureTree::new();
+        let lobe = tree.lobe(kind, 0, values);
+        tree.set_root(lobe);
+        Arc::new(Stack::<S>::new(tree, Precision::STANDARD))
+    });
+    shared.clone().downcast().expect("keyed by its type")
 }
 
 /// Every lobe with a spread of parameter blocks.
@@ -99,7 +111,8 @@ fn lanes_give_what_scalars_give() {
     let mut rng = Pcg64Mcg::seed_from_u64(4);
     for (kind, values) in instances() {
         let known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
-        let curve = kind.table(&known).map_or_else(AlbedoCurve::default, |c| c.bake::<f32>(Precision::STANDARD));
+        // Tables are read alike at any size.
+        let curve = kind.table(&known).map_or_else(AlbedoCurve::default, |c| c.bake::<f32>(Precision::FAST));
         let wo = overcoat::audit::chi2::direction::<f32>(&mut rng);
         let lobe = AnyLobe::new(kind, &values, V3::from_f32(wo), &curve);
         for _ in 0..100 {
@@ -167,7 +180,10 @@ fn odd_numbers_give_finite_results() {
     for &kind in LobeKind::ALL {
         for _ in 0..40 {
             let values = block(kind, |_| Some(ODD[rng.random_range(0..ODD.len())]));
-            let stack = single::<f32>(kind, &values);
+            let mut tree = ClosureTree::new();
+            let lobe = tree.lobe(kind, 0, &values);
+            tree.set_root(lobe);
+            let stack = Stack::<f32>::new(tree, Precision::FAST);
             for _ in 0..400 {
                 let mut odd = || ODD[rng.random_range(0..ODD.len())];
                 let mut direction = || [odd(), odd(), odd()];

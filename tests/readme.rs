@@ -32,6 +32,22 @@ fn its_commands_run() {
 }
 
 #[test]
+fn the_commands_of_the_audit_page_run() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("docs/audit.md")).expect("docs/audit.md");
+    let mut commands = 0;
+    for line in text.lines() {
+        let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
+        let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
+        let output = command.current_dir(root).args(arguments.split_whitespace()).output().expect("the program starts");
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stdout.len() > 100, "{line}");
+        commands += 1;
+    }
+    assert!(commands >= 4, "{commands} commands");
+}
+
+#[test]
 fn its_script_compiles_without_a_warning() {
     let text = readme();
     let script = text.split("```c\n").nth(1).and_then(|t| t.split("```").next()).expect("a script");

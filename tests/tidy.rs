@@ -14,14 +14,15 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("lobes", &["albedo", "optics"]),
     ("closure", &["lobes", "albedo", "optics", "globals"]),
     ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
-    ("audit", &["closure", "lobes", "albedo", "optics"]),
-    ("engine", &["ir", "closure", "albedo", "optics", "diag", "span", "globals"]),
+    ("audit", &["engine", "ir", "closure", "lobes", "albedo", "optics", "globals"]),
+    ("engine", &["ir", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
+    ("prove", &["ir", "closure", "lobes", "audit", "optics", "engine", "diag", "span", "globals"]),
     ("preview", &["engine", "closure", "lobes", "globals"]),
     (
         "cli",
         &[
-            "engine", "preview", "audit", "closure", "lobes", "albedo", "optics", "ir", "syntax", "diag", "span",
-            "globals",
+            "engine", "prove", "preview", "audit", "closure", "lobes", "albedo", "optics", "ir", "syntax", "diag",
+            "span", "globals",
         ],
     ),
 ];

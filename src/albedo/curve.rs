@@ -2,7 +2,7 @@
 //!
 //! Uniform nodes in x = μ^¼, because albedos change fastest toward grazing; linear between them. `view` estimates
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
-//! nodes around each, so that it never lies below either.
+//! nodes around each, so that it never lies below either; `view_bound` likewise, of E_view alone.
 
 use super::facets::FacetTables;
 use super::fibre::FibreTables;
@@ -92,6 +92,8 @@ pub struct AlbedoCurve<S> {
     /// Row after row, `cos_nodes` each; a row per node of the varying parameter.
     view: Vec<S>,
     bound: Vec<S>,
+    /// Empty where E_light equals E_view: then `bound` serves.
+    view_bound: Vec<S>,
     /// Empty unless [`CurveSpec::bounded`].
     excess: Vec<S>,
     /// What [`CurveSpec::extra`] gave.
@@ -116,6 +118,7 @@ where
         AlbedoCurve {
             view: vec![],
             bound: vec![],
+            view_bound: vec![],
             excess: vec![],
             extra: vec![],
             cos_nodes: 0,
@@ -141,6 +144,12 @@ impl<S: Real> AlbedoCurve<S> {
         self.read(&self.bound, w.z, parameter)
     }
 
+    /// At least E_view; 0 below the surface.
+    #[inline(always)]
+    pub fn view_bound<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+        self.read(if self.view_bound.is_empty() { &self.bound } else { &self.view_bound }, w.z, parameter)
+    }
+
     /// At least max(1, E_view, E_light) of the lobe before it is divided. A lobe that gains divides f by the larger of
     /// this at ωo and at ωi: symmetric, and E ≤ 1 from both sides. 1 for lobes that never gain.
     #[inline(always)]
@@ -154,9 +163,43 @@ impl<S: Real> AlbedoCurve<S> {
         &self.extra
     }
 
+    /// The smallest E_view and the largest bound at the nodes around a range of cosines and of the varying parameter:
+    /// between nodes both are interpolated, so that nothing lies outside. (0, 0) below the surface.
+    pub fn range(&self, cos: (f64, f64), parameter: (f64, f64)) -> (f64, f64)
+    where
+        S: Scalar,
+    {
+        if self.view.is_empty() || cos.1 <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let nodes = |lo: f64, hi: f64, count: usize| {
+            let last = (count - 1) as f64;
+            // A hair wider: the reading type may round into the next cell.
+            let at = |x: f64, slack: f64| (x * last + slack).clamp(0.0, last);
+            at(lo, -1e-3).floor() as usize..=at(hi, 1e-3).ceil() as usize
+        };
+        let x = |c: f64| c.clamp(0.0, 1.0).sqrt().sqrt();
+        let y = |p: f64| (p.max(0.0).sqrt() - self.lo.to_f64()) * self.inv_range.to_f64();
+        let rows = if self.rows == 1 {
+            0..=0
+        } else {
+            nodes(y(parameter.0).clamp(0.0, 1.0), y(parameter.1).clamp(0.0, 1.0), self.rows)
+        };
+        let (mut lowest, mut highest) = (f64::INFINITY, 0.0f64);
+        for row in rows {
+            for node in nodes(x(cos.0), x(cos.1), self.cos_nodes) {
+                let at = row * self.cos_nodes + node;
+                lowest = lowest.min(self.view[at].to_f64());
+                highest = highest.max(self.bound[at].to_f64());
+            }
+        }
+        (if cos.0 >= 0.0 { lowest } else { 0.0 }, highest)
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
-        (self.view.len() + self.bound.len() + self.excess.len() + self.extra.len()) * size_of::<S>()
+        [&self.view, &self.bound, &self.view_bound, &self.excess, &self.extra].map(Vec::len).iter().sum::<usize>()
+            * size_of::<S>()
             + self.fibre.bytes()
             + self.facets.bytes()
     }
@@ -211,7 +254,7 @@ impl CurveSpec {
         let at_least_one = |e: &S| e.max(S::one());
         let excess = AlbedoCurve { excess: raw.bound.iter().map(at_least_one).collect(), ..raw };
         let mut curve = self.bake_with(precision, &excess);
-        for b in &mut curve.bound {
+        for b in curve.bound.iter_mut().chain(&mut curve.view_bound) {
             *b = b.min(S::one());
         }
         AlbedoCurve { excess: excess.excess, extra: excess.extra, ..curve }
@@ -233,6 +276,7 @@ impl CurveSpec {
         let mut curve = AlbedoCurve {
             view: albedos.iter().map(|a| S::c(a.view)).collect(),
             bound: albedos.iter().map(|a| S::c(a.bound())).collect(),
+            view_bound: vec![],
             excess: vec![],
             extra: vec![],
             cos_nodes: n,
@@ -242,37 +286,42 @@ impl CurveSpec {
             fibre: FibreTables::default(),
             facets: FacetTables::default(),
         };
-        let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos).bound();
+        let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos);
         let lifts = shortfalls(&curve, truth, parameter, cosine);
-        for (b, lift) in curve.bound.iter_mut().zip(lifts) {
-            *b += S::c(precision.margin + lift);
+        for (b, lift) in curve.bound.iter_mut().zip(&lifts) {
+            *b += S::c(precision.margin + lift[0]);
+        }
+        if !self.reciprocal {
+            let lifted = |(v, lift): (&S, &[f64; 2])| *v + S::c(precision.margin + lift[1]);
+            curve.view_bound = curve.view.iter().zip(&lifts).map(lifted).collect();
         }
         curve
     }
 }
 
-/// How much every node of the bound must rise so that nothing between the nodes lies above it: twice what the probes in
-/// the middle see, because a kink close to a node shows there with half its height.
+/// How much every node of the bound, and of E_view, must rise so that nothing between the nodes lies above it: twice what
+/// the probes in the middle see, because a kink close to a node shows there with half its height.
 fn shortfalls<S: Scalar>(
     curve: &AlbedoCurve<S>,
-    truth: impl Fn(f64, f64) -> f64 + Sync,
+    truth: impl Fn(f64, f64) -> Albedos + Sync,
     parameter: impl Fn(f64) -> f64 + Sync,
     cosine: impl Fn(f64) -> f64 + Sync,
-) -> Vec<f64> {
+) -> Vec<[f64; 2]> {
     // Cell centres, and the middles of the cells' edges between rows.
     let half_rows = 2 * curve.rows - 1;
     let probes: Vec<(usize, usize)> =
         (0..half_rows).flat_map(|row| (0..curve.cos_nodes - 1).map(move |node| (row, node))).collect();
     let shortfalls = parallel(&probes, |&(half_row, node)| {
         let (p, cos) = (parameter(half_row as f64 / 2.0), cosine(node as f64 + 0.5));
-        truth(p, cos) - curve.bound(V3::polar(S::c(cos), S::zero()), S::c(p)).to_f64()
+        let (truth, w) = (truth(p, cos), V3::polar(S::c(cos), S::zero()));
+        [truth.bound() - curve.bound(w, S::c(p)).to_f64(), truth.view - curve.view(w, S::c(p)).to_f64()]
     });
-    let mut lifts = vec![0.0f64; curve.rows * curve.cos_nodes];
+    let mut lifts = vec![[0.0f64; 2]; curve.rows * curve.cos_nodes];
     for (&(half_row, node), shortfall) in probes.iter().zip(shortfalls) {
         for row in [half_row / 2, half_row.div_ceil(2)] {
             for corner in [node, node + 1] {
                 let lift = &mut lifts[row * curve.cos_nodes + corner];
-                *lift = lift.max(2.0 * shortfall);
+                *lift = std::array::from_fn(|k| lift[k].max(2.0 * shortfall[k]));
             }
         }
     }

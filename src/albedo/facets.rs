@@ -235,6 +235,36 @@ impl<S: Real> FacetTables<S> {
     }
 }
 
+impl<S: Scalar> FacetTables<S> {
+    /// The directions of the nodes about cosines between `cos.0` and `cos.1` (signed); of one row where the rows are a
+    /// width's. What is read between them is linear in what is read there.
+    pub fn directions(&self, cos: (f64, f64)) -> impl Iterator<Item = V3<f64>> {
+        let last = (self.nodes.max(2) - 1) as f64;
+        let rows = if matches!(self.kind, Rows::Alpha) { 1 } else { self.rows };
+        let place = |c: f64| c.clamp(0.0, 1.0).sqrt().sqrt() * last;
+        let sheet = move |side: f64, lo: f64, hi: f64| {
+            let nodes = place(lo).floor() as usize..=place(hi).ceil() as usize;
+            let roots = match self.kind {
+                Rows::Azimuth(roots) => roots.map(|r| r.to_f64()),
+                _ => [1.0; 2],
+            };
+            nodes.flat_map(move |node| {
+                (0..rows).map(move |row| {
+                    // Just inside the horizon, where nothing is lit.
+                    let cos = (node as f64 / last).powi(4).max(1e-12);
+                    let t = row as f64 / (rows.max(2) - 1) as f64;
+                    let (sin_phi, cos_phi) = (t * roots[0]).atan2((1.0 - t) * roots[1]).sin_cos();
+                    let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
+                    V3::new(sin * cos_phi, sin * sin_phi, side * cos)
+                })
+            })
+        };
+        let above = (cos.1 > 0.0).then(|| sheet(1.0, cos.0, cos.1));
+        let below = (cos.0 < 0.0 && self.sheets == 2).then(|| sheet(-1.0, -cos.1, -cos.0));
+        above.into_iter().flatten().chain(below.into_iter().flatten())
+    }
+}
+
 /// The row of a width, in [0, 1].
 fn alpha_row<S: Real>(width: S) -> S {
     let low = MIN_ALPHA.sqrt().sqrt();

@@ -9,14 +9,18 @@
 //! here are reciprocal, so one albedo serves both sides. `bound` is lifted by the shortfall of the interpolation,
 //! measured between the nodes.
 
+use super::bends::bends;
 use super::curve::{AlbedoCurve, CurveSpec, Precision, parallel};
 use super::facets::FacetSpec;
+use super::panels::Panels;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Most components of a lobe.
 pub const COMPONENTS: usize = 3;
+/// Most offsets of a family of threads.
+pub const OFFSETS: usize = 5;
 /// The parameters of a lobe that its tables depend on.
 pub type FibreKey = [f64; 16];
 /// The components of f(ωo, ωi) for many ωi: `(key, ωo, ωi, out)`.
@@ -44,12 +48,26 @@ pub struct FibreSpec {
     pub margin: f64,
     /// Whether the albedo is even in x.
     pub mirrored: bool,
+    /// For a cloth of two families of threads, along x and along y, the ridges of each. The kernel is then asked for one
+    /// family's part of f at a time, 0 or 1 in the last entry of the key, and that is integrated about its own threads.
+    pub weave: Option<[Ridges; 2]>,
+}
+
+/// Where the ridges of a family of threads lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ridges {
+    /// Standard deviation of one ridge in θi, in radians.
+    pub width: f64,
+    /// How far from θi = −θo they may lie, in radians.
+    pub reach: f64,
+    /// How far the family's tangents bend out of the surface, in radians: each has a horizon of its own.
+    pub offsets: [f64; OFFSETS],
 }
 
 impl PartialEq for FibreSpec {
     fn eq(&self, o: &Self) -> bool {
         let parts = |s: &Self| (s.key, s.components, s.axis, s.width, s.around, s.detail, s.margin, s.mirrored);
-        std::ptr::fn_addr_eq(self.kernel, o.kernel) && parts(self) == parts(o)
+        std::ptr::fn_addr_eq(self.kernel, o.kernel) && parts(self) == parts(o) && self.weave == o.weave
     }
 }
 
@@ -96,11 +114,22 @@ pub struct FibreTables<S> {
     nodes: usize,
     /// Rows go over this entry of the key in place of φ.
     axis: Option<usize>,
+    /// There are threads along y as well: nodes are dense toward the poles of both families.
+    crossed: bool,
 }
 
 impl<S> Default for FibreTables<S> {
     fn default() -> Self {
-        FibreTables { view: vec![], bound: vec![], components: 0, sheets: 1, rows: 1, nodes: 0, axis: None }
+        FibreTables {
+            view: vec![],
+            bound: vec![],
+            components: 0,
+            sheets: 1,
+            rows: 1,
+            nodes: 0,
+            axis: None,
+            crossed: false,
+        }
     }
 }
 
@@ -127,6 +156,30 @@ impl<S: Real> FibreTables<S> {
         self.read(&self.bound, w, t)
     }
 
+    /// The largest bound per component over all directions and the varying parameter: that of a node.
+    pub fn highest(&self) -> [f64; COMPONENTS]
+    where
+        S: Scalar,
+    {
+        let mut highest = [0.0f64; COMPONENTS];
+        let plane = self.sheets * self.rows * self.nodes;
+        for (highest, chunk) in highest.iter_mut().zip(self.bound.chunks(plane.max(1))) {
+            *highest = chunk.iter().fold(0.0, |a, b| a.max(b.to_f64()));
+        }
+        highest
+    }
+
+    /// The directions of the nodes, of one row where the rows are a parameter's.
+    pub fn directions(&self) -> impl Iterator<Item = V3<f64>> {
+        let (sheets, rows, nodes) = (self.sheets, self.rows, self.nodes);
+        let around = self.axis.is_none() && rows > 1;
+        (0..sheets * rows * nodes).map(move |k| {
+            let (sheet, row, node) = (k / (rows * nodes), k % (rows * nodes) / nodes, k % nodes);
+            let row = if around { row as f64 / (rows - 1) as f64 } else { 1.0 };
+            direction(sheet, row, node as f64 / (nodes.max(2) - 1) as f64, self.crossed)
+        })
+    }
+
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
         (self.view.len() + self.bound.len()) * size_of::<S>()
@@ -147,7 +200,15 @@ impl<S: Real> FibreTables<S> {
             let i = x.floor().min(L::c((n.max(2) - 2) as f64));
             (i, x - i)
         };
-        let (i, s) = cell((across / (across + w.x.abs()).max(tiny)).sqrt(), self.nodes);
+        let inv = L::one() / (across + w.x.abs()).max(tiny);
+        let place = if self.crossed {
+            let half = L::c(0.5).sqrt();
+            let (near, far) = (half * (across * inv).sqrt(), L::one() - half * (w.x.abs() * inv).sqrt());
+            L::select(across.lt(w.x.abs()), near, far)
+        } else {
+            (across * inv).sqrt()
+        };
+        let (i, s) = cell(place, self.nodes);
         let row = if self.axis.is_some() { t } else { (z / (z + w.y.abs()).max(tiny)).sqrt() };
         let (j, r) = cell(row, self.rows);
         let sheet = if self.sheets == 2 {
@@ -184,13 +245,13 @@ impl FibreSpec {
         let scaled = |count: usize| (count as f64 * self.detail) as usize;
         let size = scaled(precision.cos_nodes);
         let precision = Precision { polar: scaled(precision.polar), ..precision };
-        let flat = !self.around && self.axis.is_none();
-        let nodes = if flat { size } else { (size / if self.axis.is_some() { 6 } else { 4 }).clamp(14, 64) };
-        let rows = match self.axis {
-            Some(_) if self.around => (precision.axis_nodes / 2).max(8),
-            Some(_) => precision.axis_nodes,
-            None if self.around => (size / if self.detail < 1.0 { 6 } else { 10 }).clamp(8, 28),
-            None => 1,
+        let (rows, nodes) = match (self.axis, self.weave) {
+            // Every quadrature becomes a node; see `bends`.
+            (None, Some(_)) => ((size * 47 / 100).clamp(14, 80), (size * 47 / 100).clamp(14, 80)),
+            (None, None) if self.around => ((size / 10).clamp(8, 28), (size / 4).clamp(14, 64)),
+            (None, None) => (1, size),
+            (Some(_), _) if self.around => ((precision.axis_nodes / 2).max(8), (size / 6).clamp(14, 64)),
+            (Some(_), _) => (precision.axis_nodes, (size / 6).clamp(14, 64)),
         };
         let sheets = if self.mirrored { 1 } else { 2 };
         let grid = Grid { spec: self, rule: FibreQuadrature::new(precision), rows, nodes };
@@ -211,8 +272,19 @@ impl FibreSpec {
             rows,
             nodes,
             axis: self.axis,
+            crossed: self.weave.is_some(),
         };
-        let lifts = grid.shortfalls(&tables);
+        let mut lifts = grid.shortfalls(&tables);
+        if self.weave.is_some() {
+            let bends = bends(&albedos, rows, nodes);
+            for (lift, bend) in lifts.iter_mut().zip(&bends) {
+                *lift = std::array::from_fn(|c| lift[c] + bend.low[c]);
+            }
+            let rise = |c: usize| bends.iter().map(move |b| S::c(b.middle[c]));
+            for (view, rise) in tables.view.iter_mut().zip((0..self.components).flat_map(rise)) {
+                *view = (*view + rise).max(S::zero());
+            }
+        }
         for (c, chunk) in tables.bound.chunks_mut(sheets * plane).enumerate() {
             for (bound, lift) in chunk.iter_mut().zip(&lifts) {
                 // Relative as well: these albedos may be far above 1.
@@ -221,6 +293,22 @@ impl FibreSpec {
         }
         tables
     }
+}
+
+/// Where the fractions `row` and `place` along a node's row lie: square roots of diamond angles, for crossed threads
+/// from both ends.
+fn direction(sheet: usize, row: f64, place: f64, crossed: bool) -> V3<f64> {
+    // A cloth's f is a quotient of small numbers at its horizons, and has to stay away from their limits.
+    let (along, least) = match crossed {
+        true if place < 0.5 => ((2.0 * place * place).max(1e-5), 1e-5),
+        true => (1.0 - 2.0 * (1.0 - place).powi(2), 1e-5),
+        false => (place.powi(2).max(1e-9), 1e-12),
+    };
+    let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
+    let (cos, sin) = unit(along, 1.0 - along);
+    let around = row.powi(2);
+    let (z, y) = unit(around.max(least), 1.0 - around);
+    V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
 }
 
 /// The nodes of a table and how to integrate there; fractional indices lie between nodes.
@@ -238,15 +326,11 @@ impl Grid<'_> {
 
     /// The direction at a node; just above the horizon in place of the horizon itself.
     fn direction(&self, sheet: usize, row: f64, node: f64) -> V3<f64> {
-        let along = (node / (self.nodes - 1) as f64).powi(2).max(1e-9);
         let around = match self.spec.axis {
-            None if self.rows > 1 => (row / (self.rows - 1) as f64).powi(2),
+            None if self.rows > 1 => row / (self.rows - 1) as f64,
             _ => 1.0,
         };
-        let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
-        let (cos, sin) = unit(along, 1.0 - along);
-        let (z, y) = unit(around.max(1e-12), 1.0 - around);
-        V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
+        direction(sheet, around, node / (self.nodes - 1) as f64, self.spec.weave.is_some())
     }
 
     fn albedos(&self, sheet: usize, row: f64, node: f64) -> [f64; COMPONENTS] {
@@ -268,14 +352,14 @@ impl Grid<'_> {
     }
 
     /// How much every node of the bound must rise so that no probe between the nodes lies above it, with a fifth more
-    /// for what lies between the probes.
+    /// for what lies between the probes. A cloth is probed about the poles only.
     fn shortfalls<S: Scalar>(&self, tables: &FibreTables<S>) -> Vec<[f64; COMPONENTS]> {
         let (rows, nodes) = (self.rows, self.nodes);
         // In cells: the middles of cells and of their edges between rows; the last cell of the first band more often,
         // because its corner is a pole of the threads across, about which the albedo turns within any distance.
         let mut probes: Vec<(usize, f64, f64)> = Vec::new();
         for sheet in 0..tables.sheets {
-            for half in 0..2 * rows - 1 {
+            for half in 0..if self.spec.weave.is_some() { 0 } else { 2 * rows - 1 } {
                 probes.extend((0..nodes - 1).map(|n| (sheet, half as f64 / 2.0, n as f64 + 0.5)));
                 // A full step along the rows lies on a node.
                 if half % 2 == 1 {
@@ -306,10 +390,17 @@ impl Grid<'_> {
     }
 }
 
-/// A product rule over (θi, φi), split at the ridge θi = −θo and graded toward it.
+/// Widths of panels, in radians, from which on they take more points.
+const PANELS: [f64; 3] = [0.15, 0.45, 1.0];
+
+/// A product rule over (θi, φi) that follows the ridges.
 pub struct FibreQuadrature {
     along: Rule,
+    /// For one cell of a family's ridges.
+    cell: Rule,
     around: Vec<(f64, f64, f64)>,
+    /// For panels around the thread, by width.
+    panels: [Rule; PANELS.len() + 1],
 }
 
 impl FibreQuadrature {
@@ -324,33 +415,155 @@ impl FibreQuadrature {
         };
         FibreQuadrature {
             along: Rule::gauss_legendre(precision.polar.min(40)),
+            cell: Rule::gauss_legendre((precision.polar / 5).clamp(4, 8)),
             around: around.nodes.iter().zip(&around.weights).map(point).collect(),
+            panels: [2, 3, 5, 9].map(|points| Rule::gauss_legendre(points * precision.azimuth.max(16) / 24)),
         }
     }
 
     /// ∫ f·μ over the other direction, per component.
     pub fn albedos(&self, spec: &FibreSpec, key: &FibreKey, w: V3<f64>) -> [f64; COMPONENTS] {
-        let ridge = -w.x.atan2(w.y.hypot(w.z));
-        let mut ring = vec![w; self.around.len()];
-        let mut values = vec![[0.0; COMPONENTS]; self.around.len()];
+        let ridge = |w: V3<f64>| -w.x.atan2(w.y.hypot(w.z));
+        let Some(families) = spec.weave else {
+            return self.ring_by_ring(spec, key, w, &self.graded(ridge(w), spec.width), |wi| wi);
+        };
+        let mut key = *key;
         let mut sums = [0.0; COMPONENTS];
+        for (family, ridges) in families.iter().enumerate() {
+            key[key.len() - 1] = family as f64;
+            // The weft's frame is a quarter turn from the warp's.
+            let own = if family == 0 { w } else { V3::new(w.y, -w.x, w.z) };
+            let across = families[1 - family].offsets.map(|d| if family == 0 { d } else { -d });
+            let panels = Panels::new(own, &ridges.offsets, across);
+            let along = self.cells(ridge(own), ridges);
+            let part = self.panel_by_panel(spec, &key, w, &along, &panels, family);
+            sums = std::array::from_fn(|c| sums[c] + part[c]);
+        }
+        sums
+    }
+
+    /// ∫ f·μ of one family, each ring split where f has kinks.
+    fn panel_by_panel(
+        &self,
+        spec: &FibreSpec,
+        key: &FibreKey,
+        w: V3<f64>,
+        along: &[(f64, f64)],
+        panels: &Panels,
+        family: usize,
+    ) -> [f64; COMPONENTS] {
+        let (mut turns, mut ring, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sums = [0.0; COMPONENTS];
+        for (theta, weight) in along {
+            let (sin, cos) = theta.sin_cos();
+            self.turns(&panels.edges(sin / cos.max(1e-9)), &mut turns);
+            ring.clear();
+            ring.extend(turns.iter().map(|&(phi, _): &(f64, f64)| {
+                let (s, c) = phi.sin_cos();
+                let (y, z) = (cos * s, cos * c);
+                if family == 0 { V3::new(sin, y, z) } else { V3::new(-y, sin, z) }
+            }));
+            values.resize(ring.len(), [0.0; COMPONENTS]);
+            (spec.kernel)(key, w, &ring, &mut values);
+            for ((value, wi), (_, a)) in values.iter().zip(&ring).zip(&turns) {
+                for c in 0..spec.components {
+                    sums[c] += weight * cos * wi.z * a * value[c];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Points and weights in φi between these edges, more in wider panels; the outermost graded toward the horizon.
+    fn turns(&self, edges: &[f64], out: &mut Vec<(f64, f64)>) {
+        out.clear();
+        for e in edges.windows(2) {
+            let length = e[1] - e[0];
+            let rule = &self.panels[PANELS.iter().take_while(|l| length > **l).count()];
+            for (u, w) in rule.nodes.iter().zip(&rule.weights) {
+                if e[1] == FRAC_PI_2 {
+                    out.push((e[1] - length * u * u, 2.0 * u * w * length));
+                } else if e[0] == -FRAC_PI_2 {
+                    out.push((e[0] + length * u * u, 2.0 * u * w * length));
+                } else {
+                    out.push((e[0] + length * u, w * length));
+                }
+            }
+        }
+    }
+
+    /// Points and weights in θi: θ = ridge + length·uᵖ on each side, a third of the points within the ridge's width.
+    fn graded(&self, ridge: f64, width: f64) -> Vec<(f64, f64)> {
+        let mut points = Vec::with_capacity(2 * self.along.nodes.len());
         for length in [FRAC_PI_2 - ridge, -FRAC_PI_2 - ridge] {
             if length.abs() < 1e-9 {
                 continue;
             }
-            // θ = ridge + length·uᵖ: a third of the points lie within the ridge's width.
-            let power = ((spec.width / length.abs()).ln() / 0.35f64.ln()).clamp(1.0, 6.0);
+            let power = ((width / length.abs()).ln() / 0.35f64.ln()).clamp(1.0, 6.0);
             for (u, weight) in self.along.nodes.iter().zip(&self.along.weights) {
-                let (sin, cos) = (ridge + length * u.powf(power)).sin_cos();
-                let weight = weight * length.abs() * power * u.powf(power - 1.0) * cos * cos;
-                for (wi, &(y, z, _)) in ring.iter_mut().zip(&self.around) {
-                    *wi = V3::new(sin, cos * y, cos * z);
+                points.push((ridge + length * u.powf(power), weight * length.abs() * power * u.powf(power - 1.0)));
+            }
+        }
+        points
+    }
+
+    /// Points and weights in θi: cells of two widths over all the ridges, growing twofold beyond them, and shrinking
+    /// twofold where the ridges reach the thread's end, toward which f grows.
+    fn cells(&self, center: f64, ridges: &Ridges) -> Vec<(f64, f64)> {
+        let half = ridges.reach + 4.0 * ridges.width;
+        let (lo, hi) = ((center - half).max(-FRAC_PI_2), (center + half).min(FRAC_PI_2));
+        let count = ((hi - lo) / (2.0 * ridges.width)).ceil().max(1.0);
+        let step = (hi - lo) / count;
+        let mut edges: Vec<f64> = (0..=count as usize).map(|k| lo + step * k as f64).collect();
+        for (start, end) in [(lo, -FRAC_PI_2), (hi, FRAC_PI_2)] {
+            let way = (end - start).abs();
+            if way < 1e-6 {
+                // As far as cos θo, and only where the ridge is: beyond, f no longer grows.
+                let least = (0.3 * center.cos()).max(5e-3);
+                let mut length = 0.5 * step;
+                while length > least && center * end > 0.0 {
+                    edges.push(end - length.copysign(end));
+                    length *= 0.5;
                 }
-                (spec.kernel)(key, w, &ring, &mut values);
-                for (value, a) in values.iter().zip(&self.around) {
-                    for c in 0..spec.components {
-                        sums[c] += weight * a.2 * value[c];
-                    }
+            } else {
+                let mut along = 2.0 * ridges.width;
+                while along < 0.8 * way {
+                    edges.push(start + along.copysign(end));
+                    along *= 3.0;
+                }
+                edges.push(end);
+            }
+        }
+        edges.sort_by(f64::total_cmp);
+        let rule = || self.cell.nodes.iter().zip(&self.cell.weights);
+        let cell = |e: &[f64]| {
+            let (a, length) = (e[0], e[1] - e[0]);
+            rule().map(move |(u, w)| (a + length * u, w * length)).collect::<Vec<_>>()
+        };
+        edges.windows(2).flat_map(cell).collect()
+    }
+
+    /// ∫ f·μ with these points along the thread; `place` brings a direction in the thread's frame into the lobe's.
+    fn ring_by_ring(
+        &self,
+        spec: &FibreSpec,
+        key: &FibreKey,
+        w: V3<f64>,
+        along: &[(f64, f64)],
+        place: impl Fn(V3<f64>) -> V3<f64>,
+    ) -> [f64; COMPONENTS] {
+        let mut ring = vec![w; self.around.len()];
+        let mut values = vec![[0.0; COMPONENTS]; self.around.len()];
+        let mut sums = [0.0; COMPONENTS];
+        for (theta, weight) in along {
+            let (sin, cos) = theta.sin_cos();
+            for (wi, &(y, z, _)) in ring.iter_mut().zip(&self.around) {
+                *wi = place(V3::new(sin, cos * y, cos * z));
+            }
+            (spec.kernel)(key, w, &ring, &mut values);
+            for (value, a) in values.iter().zip(&self.around) {
+                for c in 0..spec.components {
+                    sums[c] += weight * cos * cos * a.2 * value[c];
                 }
             }
         }

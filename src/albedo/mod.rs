@@ -3,11 +3,13 @@
 //! In: a lobe's f as a plain function, in double precision. Out: [`AlbedoCurve`], read in shading. Knows no lobe by
 //! name.
 
+mod bends;
 pub mod curve;
 pub mod facets;
 pub mod fibre;
+mod panels;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
 pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
-pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, TableSpec};
+pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, OFFSETS, Ridges, TableSpec};

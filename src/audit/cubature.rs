@@ -57,11 +57,25 @@ impl Default for Tolerance {
 
 /// Integrates `f(x, y)` over the rectangles with corners `[x0, x1, y0, y1]`.
 pub fn integrate(cells: &[[f64; 4]], tolerance: Tolerance, mut f: impl FnMut(f64, f64) -> [f64; 3]) -> Integral {
-    let mut heap: BinaryHeap<Cell> = cells.iter().map(|&corners| Cell::measure(corners, &mut f)).collect();
+    let cells: Vec<(usize, [f64; 4])> = cells.iter().map(|c| (0, *c)).collect();
+    integrate_until(&cells, tolerance, |_, x, y| f(x, y), |_, _| false)
+}
+
+/// Integrates several functions `f(which, x, y)`, each over the rectangles that come with its number, and adds them up.
+/// Stops early where `enough(value, error)` says so.
+pub fn integrate_until(
+    cells: &[(usize, [f64; 4])],
+    tolerance: Tolerance,
+    mut f: impl FnMut(usize, f64, f64) -> [f64; 3],
+    enough: impl Fn([f64; 3], f64) -> bool,
+) -> Integral {
+    let mut heap: BinaryHeap<Cell> =
+        cells.iter().map(|&(which, corners)| Cell::measure(which, corners, &mut f)).collect();
     let mut evaluations = heap.len() * 225;
     loop {
         let error: f64 = heap.iter().map(|c| c.error).sum();
-        let done = error <= tolerance.error;
+        let rough = heap.iter().fold([0.0; 3], |a, c| std::array::from_fn(|i| a[i] + c.value[i]));
+        let done = error <= tolerance.error || enough(rough, error);
         if done || evaluations + 450 > tolerance.evaluations {
             // Summed in a fixed order, smallest errors first.
             let cells = heap.into_sorted_vec();
@@ -72,7 +86,7 @@ pub fn integrate(cells: &[[f64; 4]], tolerance: Tolerance, mut f: impl FnMut(f64
             return Integral { value: [0.0; 3], error: 0.0, exhausted: false };
         };
         for half in worst.halves() {
-            heap.push(Cell::measure(half, &mut f));
+            heap.push(Cell::measure(worst.which, half, &mut f));
         }
         evaluations += 450;
     }
@@ -122,6 +136,7 @@ pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f6
 }
 
 struct Cell {
+    which: usize,
     corners: [f64; 4],
     value: [f64; 3],
     error: f64,
@@ -130,7 +145,7 @@ struct Cell {
 }
 
 impl Cell {
-    fn measure(corners: [f64; 4], f: &mut impl FnMut(f64, f64) -> [f64; 3]) -> Cell {
+    fn measure(which: usize, corners: [f64; 4], f: &mut impl FnMut(usize, f64, f64) -> [f64; 3]) -> Cell {
         let [x0, x1, y0, y1] = corners;
         let (cx, hx) = (0.5 * (x0 + x1), 0.5 * (x1 - x0));
         let (cy, hy) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
@@ -140,7 +155,7 @@ impl Cell {
             let (x, kx, gx) = node(i);
             for j in 0..15 {
                 let (y, ky, gy) = node(j);
-                let value = f(cx + hx * x, cy + hy * y);
+                let value = f(which, cx + hx * x, cy + hy * y);
                 for c in 0..3 {
                     sums[0][c] += kx * ky * value[c];
                     sums[1][c] += gx * ky * value[c];
@@ -153,7 +168,7 @@ impl Cell {
         let gap = |other: [f64; 3]| (0..3).map(|c| (sums[0][c] - other[c]).abs()).fold(0.0, f64::max) * area;
         let (ex, ey) = (gap(sums[1]), gap(sums[2]));
         let error = if value.iter().all(|v| v.is_finite()) { ex + ey } else { f64::INFINITY };
-        Cell { corners, value, error, along_y: ey > ex }
+        Cell { which, corners, value, error, along_y: ey > ex }
     }
 
     fn halves(&self) -> [[f64; 4]; 2] {
@@ -184,8 +199,8 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, o: &Self) -> std::cmp::Ordering {
-        let by_corner = || self.corners.map(f64::to_bits).cmp(&o.corners.map(f64::to_bits));
-        self.error.total_cmp(&o.error).then_with(by_corner)
+        let place = |c: &Cell| (c.which, c.corners.map(f64::to_bits));
+        self.error.total_cmp(&o.error).then_with(|| place(self).cmp(&place(o)))
     }
 }
 

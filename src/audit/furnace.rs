@@ -4,10 +4,11 @@
 //! Each lobe is integrated in its own frame, where its horizon is an edge of the domain; delta lobes are added
 //! exactly.
 
-use super::cubature::{Integral, Tolerance, integrate, split_at};
+use super::cubature::{Tolerance, integrate, integrate_until, split_at};
 use super::{Subject, dot};
 use crate::closure::Bsdf;
-use crate::lobes::Rgb;
+use crate::lobes::registry::LobeClass;
+use crate::lobes::{LobeKind, Rgb};
 use crate::optics::{Frame, Scalar, V3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -39,28 +40,39 @@ impl Albedo {
 
 /// The albedo of `subject` for the direction `w` (world space, unit), delta lobes included.
 pub fn albedo<'m, S: Scalar>(subject: &impl Subject<'m, S>, side: Side, w: [S; 3], tolerance: Tolerance) -> Albedo {
+    albedo_until(subject, side, w, tolerance, |_| false)
+}
+
+/// [`albedo`], stopping early where `enough` says so of what is known so far.
+pub fn albedo_until<'m, S: Scalar>(
+    subject: &impl Subject<'m, S>,
+    side: Side,
+    w: [S; 3],
+    tolerance: Tolerance,
+    enough: impl Fn(&Albedo) -> bool,
+) -> Albedo {
     let held = subject.bsdf(w);
-    let normals = distinct_normals(&held);
-    let hints = hints(&held);
-    let mut total = Albedo { value: [0.0; 3], error: 0.0 };
-    let share = Tolerance { error: tolerance.error / normals.len().max(1) as f64, ..tolerance };
-    for (group, frame) in normals.iter().enumerate() {
-        let part = over_sphere(frame, w, &hints, share, |moving| match side {
-            Side::View => held.part(moving, false, |n| group_of(&normals, n) == group),
-            Side::Light => {
-                subject.bsdf([moving.x, moving.y, moving.z]).part(vector(w), true, |n| group_of(&normals, n) == group)
-            }
-        });
-        for c in 0..3 {
-            total.value[c] += part.value[c];
-        }
-        total.error += part.error;
-    }
     let delta = delta_albedo(subject, side, w, &held);
-    for c in 0..3 {
-        total.value[c] += delta[c];
-    }
-    total
+    let total = |value: [f64; 3], error: f64| Albedo { value: std::array::from_fn(|c| value[c] + delta[c]), error };
+    let groups = groups(&held);
+    let charts: Vec<Chart<S>> = groups.iter().map(|g| g.chart(w)).collect();
+    let hints = hints(&held);
+    let cells: Vec<(usize, [f64; 4])> = charts
+        .iter()
+        .enumerate()
+        .flat_map(|(index, chart)| chart.cells_at(&hints).into_iter().map(move |c| (index, c)))
+        .collect();
+    let f = |index: usize, x: f64, y: f64| {
+        let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
+        let (moving, weight) = charts[index].direction(x, y);
+        let part = match side {
+            Side::View => held.part(moving, false, pick),
+            Side::Light => subject.bsdf([moving.x, moving.y, moving.z]).part(vector(w), true, pick),
+        };
+        part.map(|x| x.to_f64() * weight)
+    };
+    let i = integrate_until(&cells, tolerance, f, |value, error| enough(&total(value, error)));
+    total(i.value, i.error)
 }
 
 /// What one lobe does with the light of a view-side furnace.
@@ -80,11 +92,15 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
     let hints = hints(&bsdf);
     (0..bsdf.lobe_count())
         .map(|lobe| {
-            let frame = bsdf.lobe_frame(lobe);
+            let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
+            let cells = chart.cells_at(&hints);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
-                    let i = over_sphere(frame, w, &hints, tolerance, |wi| bsdf.lobe_part(lobe, wi, layered));
+                    let i = integrate(&cells, tolerance, |x, y| {
+                        let (wi, weight) = chart.direction(x, y);
+                        bsdf.lobe_part(lobe, wi, layered).map(|x| x.to_f64() * weight)
+                    });
                     Albedo { value: i.value, error: i.error }
                 }
             };
@@ -103,41 +119,158 @@ fn hints<S: Scalar>(held: &Bsdf<'_, S>) -> Vec<[S; 3]> {
     (0..64).filter_map(sample).collect()
 }
 
-/// ∫ over the sphere about `frame`, graded toward its horizon and split where `held` puts edges: at its azimuth, at
-/// right angles to it, at its own polar angle, where the two α of a layer meet, and among the `hints`.
-pub(crate) fn over_sphere<S: Scalar>(
-    frame: &Frame<S>,
-    held: [S; 3],
-    hints: &[[S; 3]],
-    tolerance: Tolerance,
-    mut f: impl FnMut(V3<S>) -> Rgb<S>,
-) -> Integral {
-    let local = frame.to_local(vector(held));
-    let azimuth = local.y.to_f64().atan2(local.x.to_f64());
-    let split = local.z.to_f64().abs().clamp(1e-4, 1.0 - 1e-4).sqrt();
-    let mut cells = Vec::new();
-    for side in [-1.0, 1.0] {
-        for quarter in 0..4 {
-            let (a, b) = (quarter as f64 * FRAC_PI_2, (quarter + 1) as f64 * FRAC_PI_2);
-            // u < 0 is the lower hemisphere.
-            let mut cell = |lo: f64, hi: f64| cells.push([lo.min(hi), lo.max(hi), a, b]);
-            cell(0.0, side * split);
-            cell(side * split, side);
+/// Lobes that are integrated together, because their edges and ridges lie alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Group<S> {
+    frame: Frame<S>,
+    /// They follow the frame's x axis; the others follow its normal alone.
+    along_thread: bool,
+}
+
+impl<S: Scalar> Group<S> {
+    fn of(frame: &Frame<S>, kind: LobeKind) -> Self {
+        Group { frame: *frame, along_thread: kind.spec().tangent_slot().is_some() }
+    }
+
+    fn takes(&self, frame: &Frame<S>, kind: LobeKind) -> bool {
+        let along_thread = kind.spec().tangent_slot().is_some();
+        self.along_thread == along_thread && self.frame.n == frame.n && (!along_thread || self.frame.t == frame.t)
+    }
+
+    /// How the sphere is laid out for them, if `held` is the direction that does not move.
+    fn chart(&self, held: [S; 3]) -> Chart<S> {
+        let local = self.frame.to_local(vector(held)).map(|x| x.to_f64());
+        let layout = if self.along_thread { Layout::around_thread(local) } else { Layout::about_normal(local) };
+        Chart { frame: self.frame, layout }
+    }
+}
+
+/// One group per distinct normal, and per distinct thread.
+fn groups<S: Scalar>(bsdf: &Bsdf<'_, S>) -> Vec<Group<S>> {
+    let mut groups: Vec<Group<S>> = Vec::new();
+    for lobe in 0..bsdf.lobe_count() {
+        let (frame, kind) = (bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0);
+        let integrated = kind.class() == LobeClass::Scatter;
+        if integrated && !groups.iter().any(|g| g.takes(frame, kind)) {
+            groups.push(Group::of(frame, kind));
         }
     }
-    let place = |hint: &[S; 3]| {
-        let local = frame.to_local(vector(*hint)).map(|x| x.to_f64());
-        let turn = (local.y.atan2(local.x) - azimuth + PI).rem_euclid(2.0 * PI);
-        [local.z.abs().sqrt().copysign(local.z), turn]
-    };
-    let points: Vec<[f64; 2]> = hints.iter().map(place).collect();
-    integrate(&split_at(&cells, &points, 4), tolerance, |u, phi| {
-        // z = ±u²: dz = 2|u| du.
-        let z = u * u.abs();
-        let (sin, phi) = ((1.0 - z * z).max(0.0).sqrt(), phi + azimuth - PI);
-        let direction = V3::new(S::c(sin * phi.cos()), S::c(sin * phi.sin()), S::c(z));
-        f(frame.to_world(direction)).map(|x| x.to_f64() * 2.0 * u.abs())
-    })
+    groups
+}
+
+/// The group a lobe is counted in; one whose frame was not there for the held direction (it may depend on the view)
+/// goes with the first.
+fn group_of<S: Scalar>(groups: &[Group<S>], frame: &Frame<S>, kind: LobeKind) -> usize {
+    groups.iter().position(|g| g.takes(frame, kind)).unwrap_or(0)
+}
+
+/// The sphere as rectangles.
+struct Chart<S> {
+    frame: Frame<S>,
+    layout: Layout,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Layout {
+    /// (u, φ): z = ±u², graded toward the horizon, and φ from the azimuth of the held direction on. Split where that
+    /// puts edges: at its azimuth, at right angles to it, and at its own polar angle, where the two α of a layer meet.
+    AboutNormal { azimuth: f64, split: f64 },
+    /// (u, v): the angles θ along the x axis and φ around it. A thread's ridge lies at θ = −θ of the held direction, as
+    /// narrow as a thousandth: the cells meet there and grow from it with the cube. φ is graded toward the horizon and
+    /// split at that of the held direction.
+    AroundThread { ridge: f64, split: f64 },
+}
+
+/// φ = ¾π·(v − v³/3), from −½π to ½π for v in [−1, 1].
+fn turn(v: f64) -> f64 {
+    0.75 * PI * (v - v.powi(3) / 3.0)
+}
+
+impl Layout {
+    fn about_normal(held: V3<f64>) -> Layout {
+        let split = held.z.abs().clamp(1e-4, 1.0 - 1e-4).sqrt();
+        Layout::AboutNormal { azimuth: held.y.atan2(held.x), split }
+    }
+
+    fn around_thread(held: V3<f64>) -> Layout {
+        let around = held.y.atan2(held.z).clamp(-FRAC_PI_2, FRAC_PI_2);
+        let split = solve(turn, around, -1.0, 1.0).clamp(-0.99, 0.99);
+        Layout::AroundThread { ridge: -held.x.atan2(held.y.hypot(held.z)), split }
+    }
+}
+
+impl<S: Scalar> Chart<S> {
+    fn cells(&self) -> Vec<[f64; 4]> {
+        match self.layout {
+            Layout::AboutNormal { split, .. } => {
+                let quarter = |k: usize| {
+                    let (a, b) = (k as f64 * FRAC_PI_2, (k + 1) as f64 * FRAC_PI_2);
+                    // u < 0 is the lower hemisphere, black for most lobes.
+                    [[-1.0, 0.0, a, b], [0.0, split, a, b], [split, 1.0, a, b]]
+                };
+                (0..4).flat_map(quarter).collect()
+            }
+            Layout::AroundThread { split, .. } => {
+                let half = |(lo, hi)| [[lo, hi, -1.0, split], [lo, hi, split, 1.0], [lo, hi, 1.0, 3.0]];
+                [(-1.0, 0.0), (0.0, 1.0)].into_iter().flat_map(half).collect()
+            }
+        }
+    }
+
+    /// [`cells`](Self::cells), split among directions where light is known to go.
+    fn cells_at(&self, hints: &[[S; 3]]) -> Vec<[f64; 4]> {
+        let points: Vec<[f64; 2]> = hints.iter().map(|w| self.place(*w)).collect();
+        split_at(&self.cells(), &points, 8)
+    }
+
+    /// Where a direction in world space lies in the chart.
+    fn place(&self, w: [S; 3]) -> [f64; 2] {
+        let local = self.frame.to_local(vector(w)).map(|x| x.to_f64());
+        match self.layout {
+            Layout::AboutNormal { azimuth, .. } => {
+                let turn = (local.y.atan2(local.x) - azimuth + PI).rem_euclid(2.0 * PI);
+                [local.z.abs().sqrt().copysign(local.z), turn]
+            }
+            Layout::AroundThread { ridge, .. } => {
+                let off = local.x.atan2(local.y.hypot(local.z)) - ridge;
+                let length = if off < 0.0 { FRAC_PI_2 + ridge } else { FRAC_PI_2 - ridge };
+                let (lift, around) =
+                    if local.z < 0.0 { (2.0, (local.y).atan2(-local.z)) } else { (0.0, local.y.atan2(local.z)) };
+                [(off / length).cbrt(), lift + solve(turn, around, -1.0, 1.0)]
+            }
+        }
+    }
+
+    /// A direction in world space, and the solid angle per area of the chart there.
+    fn direction(&self, x: f64, y: f64) -> (V3<S>, f64) {
+        let (direction, weight) = match self.layout {
+            Layout::AboutNormal { azimuth, .. } => {
+                // dz = 2|u| du.
+                let z = x * x.abs();
+                let (sin, phi) = ((1.0 - z * z).max(0.0).sqrt(), y + azimuth - PI);
+                (V3::new(sin * phi.cos(), sin * phi.sin(), z), 2.0 * x.abs())
+            }
+            Layout::AroundThread { ridge, .. } => {
+                let length = if x < 0.0 { FRAC_PI_2 + ridge } else { FRAC_PI_2 - ridge };
+                let (sin, cos) = (ridge + length * x.powi(3)).sin_cos();
+                // z ≥ 0 for v in [−1, 1]; the lower side follows for v in [1, 3].
+                let (side, v) = if y > 1.0 { (-1.0, y - 2.0) } else { (1.0, y) };
+                let (sin_phi, cos_phi) = turn(v).sin_cos();
+                let weight = length * 3.0 * x * x * 0.75 * PI * (1.0 - v * v) * cos.max(0.0);
+                (V3::new(sin, cos * sin_phi, side * cos * cos_phi), weight)
+            }
+        };
+        (self.frame.to_world(direction.map(S::c)), weight)
+    }
+}
+
+/// x in `[lo, hi]` with f(x) = y, for an increasing f.
+fn solve(f: impl Fn(f64) -> f64, y: f64, mut lo: f64, mut hi: f64) -> f64 {
+    for _ in 0..50 {
+        let middle = 0.5 * (lo + hi);
+        if f(middle) < y { lo = middle } else { hi = middle }
+    }
+    0.5 * (lo + hi)
 }
 
 fn vector<S>(w: [S; 3]) -> V3<S> {
@@ -145,24 +278,13 @@ fn vector<S>(w: [S; 3]) -> V3<S> {
     V3 { x, y, z }
 }
 
-/// One frame per distinct normal.
-fn distinct_normals<S: Scalar>(bsdf: &Bsdf<'_, S>) -> Vec<Frame<S>> {
-    let mut frames: Vec<Frame<S>> = Vec::new();
-    for frame in bsdf.frames() {
-        if !frames.iter().any(|f| f.n == frame.n) {
-            frames.push(*frame);
-        }
-    }
-    frames
-}
-
-/// The group a lobe with normal `n` is counted in; a normal that was not there for the held direction (it may depend
-/// on the view) goes with the first.
-fn group_of<S: Scalar>(normals: &[Frame<S>], n: V3<S>) -> usize {
-    normals.iter().position(|f| f.n == n).unwrap_or(0)
-}
-
-fn delta_albedo<'m, S: Scalar>(subject: &impl Subject<'m, S>, side: Side, w: [S; 3], held: &Bsdf<'m, S>) -> Rgb<f64> {
+/// What delta lobes add to the albedo.
+pub(super) fn delta_albedo<'m, S: Scalar>(
+    subject: &impl Subject<'m, S>,
+    side: Side,
+    w: [S; 3],
+    held: &Bsdf<'m, S>,
+) -> Rgb<f64> {
     if side == Side::View {
         return held.delta_albedo().map(S::to_f64);
     }

@@ -1,15 +1,29 @@
 //! Energy and consistency of whole materials, measured: white furnace from both sides, reciprocity, chi-square.
 //!
-//! In: a [`Subject`], anything that gives a BSDF for a direction. Out: numbers with error estimates. Everything here
+//! In: a [`Subject`], anything that gives a BSDF for a direction, or a whole
+//! [`Material`](crate::engine::Material). Out: numbers with error estimates. Everything here
 //! is deterministic, or takes a seeded generator.
 
+pub mod campaign;
 pub mod chi2;
 pub mod cubature;
+pub mod estimate;
 pub mod furnace;
+mod gain;
+mod ledger;
+mod script;
+#[cfg(feature = "proptest")]
+pub mod strategy;
+pub mod trees;
 
+pub use campaign::{Campaign, Tally};
 pub use chi2::{Chi2, chi2, reciprocity_error};
 pub use cubature::Tolerance;
-pub use furnace::{Albedo, LobeShare, Side, albedo, breakdown};
+pub use estimate::{Estimate, estimate};
+pub use furnace::{Albedo, LobeShare, Side, albedo, albedo_until, breakdown};
+pub use gain::{Gain, assert_no_gain};
+pub use ledger::{LayerShare, Ledger, ledger};
+pub use script::script;
 
 use crate::closure::Bsdf;
 use crate::optics::Scalar;

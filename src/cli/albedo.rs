@@ -2,7 +2,8 @@
 
 use super::input::{Evaluate, in_tier};
 use super::{Failure, Global, Outcome, output};
-use crate::audit::{Albedo, Side, Tolerance, albedo, breakdown};
+use crate::audit::{Albedo, Ledger, LobeShare, Side, Tolerance, albedo, breakdown, ledger};
+use crate::closure::{Bsdf, ClosureTree};
 use crate::engine::Material;
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
@@ -49,6 +50,8 @@ const DEFAULT_COSINES: [f64; 12] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2,
 /// More lobes than this are not explained one by one.
 const MAX_EXPLAINED: usize = 64;
 
+const TOLERANCE: Tolerance = Tolerance { error: 2e-5, evaluations: 200_000 };
+
 /// One measured direction.
 struct Row {
     cos: f64,
@@ -94,27 +97,34 @@ fn measure<S: Evaluate>(material: &Material, cosines: &[f64], args: &AlbedoArgs)
         SideArg::View => Side::View,
         SideArg::Light => Side::Light,
     };
-    let tolerance = Tolerance { error: 2e-5, evaluations: 200_000 };
+    let tolerance = TOLERANCE;
     let rows = cosines.par_iter().map(|&cos| {
         let (sin, phi) = ((1.0 - cos * cos).max(0.0).sqrt(), args.phi.to_radians());
         let direction = [sin * phi.cos(), sin * phi.sin(), cos];
         let w = direction.map(S::c);
         let albedo = albedo(&subject, side, w, tolerance);
-        let explained = args.explain.then(|| explain(&subject(w), &breakdown(&subject, w, tolerance), &albedo));
+        let explained = args.explain.then(|| explain::<S>(material, &globals, w, &albedo));
         Row { cos, direction, albedo, explained }
     });
     Ok(rows.collect())
 }
 
-/// Lobe by lobe: what it scatters, and what the layers above keep from it. What is left of 1 is absorbed.
-fn explain<S: Evaluate>(
-    bsdf: &crate::closure::Bsdf<'_, S>,
-    shares: &[crate::audit::LobeShare],
-    total: &Albedo,
-) -> Value {
-    if shares.len() > MAX_EXPLAINED {
-        return json!({ "note": format!("{} lobes are too many to tell apart", shares.len()) });
+/// Lobe by lobe what it scatters and what the layers above keep from it, then layer by layer, then what is absorbed.
+fn explain<S: Evaluate>(material: &Material, globals: &Globals, w: [S; 3], total: &Albedo) -> Value {
+    let seen = Globals { i: glam::Vec3::from_array(w.map(|x| -x.to_f32())), ..*globals };
+    let black = |_| Bsdf::black();
+    let Ok(tree) = material.tree(&seen) else { return Value::Null };
+    let part = |tree: &ClosureTree| S::flatten(material, tree, &seen, w).unwrap_or_else(black);
+    let bsdf = part(&tree);
+    if bsdf.lobe_count() > MAX_EXPLAINED {
+        return json!({ "note": format!("{} lobes are too many to tell apart", bsdf.lobe_count()) });
     }
+    let shares = breakdown(&|_| part(&tree), w, TOLERANCE);
+    let ledger = ledger(&tree, part, material.layering(), w, TOLERANCE);
+    explained(&bsdf, &shares, &ledger, total)
+}
+
+fn explained<S: Evaluate>(bsdf: &Bsdf<'_, S>, shares: &[LobeShare], ledger: &Ledger, total: &Albedo) -> Value {
     let minus = |a: [f64; 3], b: [f64; 3]| std::array::from_fn::<f64, 3, _>(|c| a[c] - b[c]);
     let lobes: Vec<Value> = shares
         .iter()
@@ -127,22 +137,45 @@ fn explain<S: Evaluate>(
             })
         })
         .collect();
-    json!({ "lobes": lobes, "absorbed": minus([1.0; 3], total.value) })
+    let layers: Vec<Value> = ledger
+        .layers
+        .iter()
+        .map(|l| {
+            let top: Vec<&str> = l.top.iter().map(|k| k.spec().name).collect();
+            json!({"top": top, "offered": l.offered, "taken": l.taken, "tint": l.tint, "lost": l.lost})
+        })
+        .collect();
+    json!({
+        "lobes": lobes,
+        "layers": layers,
+        "absorbed_by_weights": ledger.absorbed_by_weights,
+        "absorbed_by_lobes": ledger.absorbed_by_lobes,
+        "not_scattered": minus([1.0; 3], total.value),
+    })
 }
 
 fn explain_text(explained: &Value, text: &mut String) {
     let triple =
         |v: &Value| (0..3).map(|c| format!("{:8.5}", v[c].as_f64().unwrap_or(0.0))).collect::<Vec<_>>().join(" ");
-    if let Some(note) = explained["note"].as_str() {
-        let _ = writeln!(text, "         {note}");
-    }
+    let mut line = |v: &Value, what: &str| {
+        let _ = writeln!(text, "         {} {what}", triple(v));
+    };
     for lobe in explained["lobes"].as_array().into_iter().flatten() {
         let name = lobe["lobe"].as_str().unwrap_or("");
-        let _ = writeln!(text, "         {} scattered by {name}", triple(&lobe["scattered"]));
-        let _ = writeln!(text, "         {} kept from it by the layers above", triple(&lobe["kept_by_layers"]));
+        line(&lobe["scattered"], &format!("scattered by {name}"));
+        line(&lobe["kept_by_layers"], "  kept from it by the layers above");
     }
-    if !explained["absorbed"].is_null() {
-        let _ = writeln!(text, "         {} of 1 is absorbed", triple(&explained["absorbed"]));
+    for layer in explained["layers"].as_array().into_iter().flatten() {
+        let names: Vec<&str> = layer["top"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+        let top = names.join(", ");
+        line(&layer["tint"], &format!("withheld below {top} by the tint rule"));
+        line(&layer["lost"], &format!("lost below {top}: passed by less than 1 - E"));
+    }
+    if let Some(note) = explained["note"].as_str() {
+        let _ = writeln!(text, "         {note}");
+    } else {
+        line(&explained["absorbed_by_weights"], "absorbed by weights");
+        line(&explained["absorbed_by_lobes"], "absorbed by lobes");
     }
 }
 

@@ -1,7 +1,7 @@
 //! From arguments to materials, directions and values.
 
 use super::{Failure, Global, LayeringArg, TierArg, TintArg};
-use crate::closure::{Bsdf, LayeringRule, TintRule};
+use crate::closure::{Bsdf, ClosureTree, LayeringRule, TintRule};
 use crate::diag::Diagnostic;
 use crate::engine::{Engine, Material, ShadeError, Shader, Tier};
 use crate::globals::Globals;
@@ -13,11 +13,7 @@ use std::path::Path;
 
 impl Global {
     pub fn engine(&self) -> Engine {
-        let tier = match self.tier {
-            TierArg::Fast => Tier::Fast,
-            TierArg::Standard => Tier::Standard,
-            TierArg::Reference => Tier::Reference,
-        };
+        let tier = self.tier().unwrap_or_default();
         let rule = match self.layering {
             LayeringArg::Min => LayeringRule::Min,
             LayeringArg::Balanced => LayeringRule::Balanced,
@@ -28,6 +24,15 @@ impl Global {
             TintArg::Channel => TintRule::Channel,
         };
         Engine::new().tier(tier).layering(rule).tint_rule(tint)
+    }
+
+    /// The tier, if one is asked for.
+    pub fn tier(&self) -> Option<Tier> {
+        self.tier.map(|tier| match tier {
+            TierArg::Fast => Tier::Fast,
+            TierArg::Standard => Tier::Standard,
+            TierArg::Reference => Tier::Reference,
+        })
     }
 
     /// Compiles the script at `path` with the parameters of `--set`, then those of `more`.
@@ -46,6 +51,14 @@ impl Global {
 
     /// Sets the parameters of `--set`, then those of `more`.
     pub fn specialise(&self, shader: &Shader, more: &[(String, String)]) -> Result<Material, Failure> {
+        let values = self.values(shader, more)?;
+        let material = shader.material(&values).map_err(|e| self.setting_failed(&e.diagnostics, shader.source()))?;
+        self.warn(material.warnings(), shader.source());
+        Ok(material)
+    }
+
+    /// The values of `--set`, then those of `more`, as the types the parameters have.
+    pub fn values(&self, shader: &Shader, more: &[(String, String)]) -> Result<Vec<(String, Value)>, Failure> {
         let mut set = Vec::new();
         for given in &self.set {
             let (name, text) = name_and_value(given)?;
@@ -61,13 +74,11 @@ impl Global {
             };
             values.push((name, value));
         }
-        let material = shader.material(&values).map_err(|e| self.setting_failed(&e.diagnostics, shader.source()))?;
-        self.warn(material.warnings(), shader.source());
-        Ok(material)
+        Ok(values)
     }
 
     /// Wrong names and types in `--set` are wrong usage; anything else is the script's fault.
-    fn setting_failed(&self, diagnostics: &[Diagnostic], source: &Source) -> Failure {
+    pub fn setting_failed(&self, diagnostics: &[Diagnostic], source: &Source) -> Failure {
         if diagnostics.iter().all(|d| d.code.starts_with("E04")) {
             let lines = diagnostics.iter().map(|d| {
                 let help = d.help.iter().map(|h| format!("; {h}")).collect::<String>();
@@ -91,12 +102,12 @@ impl From<ShadeError> for Failure {
     }
 }
 
-fn stderr_has_color() -> bool {
+pub fn stderr_has_color() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
 /// The script's name for messages, and its text.
-fn read(path: &Path) -> Result<(String, String), Failure> {
+pub fn read(path: &Path) -> Result<(String, String), Failure> {
     let (name, bytes) = if path == Path::new("-") {
         let mut bytes = Vec::new();
         std::io::stdin().read_to_end(&mut bytes).map_err(|e| Failure::usage(format!("cannot read stdin: {e}")))?;
@@ -156,17 +167,43 @@ pub fn direction(option: &str, text: &str) -> Result<[f64; 3], Failure> {
 pub trait Evaluate: Scalar {
     /// The BSDF at the default point, seen from `wo`.
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [Self; 3]) -> Result<Bsdf<'m, Self>, ShadeError>;
+
+    /// The BSDF of a part of the material's tree.
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [Self; 3],
+    ) -> Result<Bsdf<'m, Self>, ShadeError>;
 }
 
 impl Evaluate for f32 {
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [f32; 3]) -> Result<Bsdf<'m, f32>, ShadeError> {
         material.shade(globals, wo.into())
     }
+
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f32; 3],
+    ) -> Result<Bsdf<'m, f32>, ShadeError> {
+        material.flatten(tree, globals, wo.into())
+    }
 }
 
 impl Evaluate for f64 {
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'m, f64>, ShadeError> {
         material.shade_reference(globals, wo)
+    }
+
+    fn flatten<'m>(
+        material: &'m Material,
+        tree: &ClosureTree,
+        globals: &Globals,
+        wo: [f64; 3],
+    ) -> Result<Bsdf<'m, f64>, ShadeError> {
+        material.flatten_reference(tree, globals, wo)
     }
 }
 

@@ -2,11 +2,15 @@
 //! and progress to stderr. Exit status: 0 fine, 1 the script has errors, 2 wrong usage or I/O, 3 a check failed.
 
 mod albedo;
+mod audit;
+mod check;
 mod cost;
 mod eval;
+mod furnace;
 mod input;
 mod lobes;
 mod output;
+mod reciprocity;
 mod render;
 mod reproduce;
 mod sample;
@@ -32,9 +36,9 @@ struct Global {
     /// Set a shader parameter: a number, three numbers `r,g,b`, or a string. Repeatable.
     #[arg(long, global = true, value_name = "NAME=VALUE")]
     set: Vec<String>,
-    /// Accuracy and speed.
-    #[arg(long, global = true, value_enum, default_value = "standard")]
-    tier: TierArg,
+    /// Accuracy and speed; `standard` if not given.
+    #[arg(long, global = true, value_enum)]
+    tier: Option<TierArg>,
     /// How a layer scales what lies below it.
     #[arg(long, global = true, value_enum, default_value = "min")]
     layering: LayeringArg,
@@ -80,6 +84,9 @@ enum Command {
     Tree {
         /// The script; `-` reads stdin.
         file: PathBuf,
+        /// Also tell how each lobe below a layer is scaled, and why.
+        #[arg(long)]
+        explain: bool,
     },
     /// Evaluate f·|cos θi| and the pdf for a pair of directions.
     Eval {
@@ -108,11 +115,19 @@ enum Command {
     },
     /// Measure the directional albedo by quadrature, delta lobes included.
     Albedo(albedo::AlbedoArgs),
+    /// Measure random trees of all lobes: does any gain energy?
+    Audit(audit::AuditArgs),
+    /// Prove that scripts keep energy for all parameters in their ranges and all directions, or show where one gains.
+    Check(check::CheckArgs),
     /// What the material makes a renderer pay: lobes, globals, bytes, nanoseconds.
     Cost {
         /// The script; `-` reads stdin.
         file: PathBuf,
     },
+    /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
+    Furnace(furnace::FurnaceArgs),
+    /// Does the material scatter alike when light and viewer change places?
+    Reciprocity(reciprocity::ReciprocityArgs),
     /// List the closures a script can call.
     Lobes {
         /// Only those of this name.
@@ -130,6 +145,10 @@ enum Failure {
     Script(String),
     /// Wrong usage, or a file that cannot be read or written.
     Usage(String),
+    /// What was checked does not hold.
+    Check(String),
+    /// All has been said; the exit status is left.
+    Status(u8),
     /// Whoever reads stdout has gone.
     Closed,
 }
@@ -146,17 +165,22 @@ type Outcome = Result<(), Failure>;
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let outcome = match &cli.command {
-        Command::Tree { file } => tree::run(&cli.global, file),
+        Command::Tree { file, explain } => tree::run(&cli.global, file, *explain),
         Command::Eval { file, wo, wi } => eval::run(&cli.global, file, wo, wi),
         Command::Sample { file, wo, count, seed } => sample::run(&cli.global, file, wo, *count, *seed),
         Command::Albedo(args) => albedo::run(&cli.global, args),
+        Command::Audit(args) => audit::run(&cli.global, args),
+        Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
+        Command::Furnace(args) => furnace::run(&cli.global, args),
+        Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { name } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,
+        Err(Failure::Status(status)) => ExitCode::from(status),
         Err(Failure::Script(messages)) => {
             eprintln!("{}", messages.trim_end());
             ExitCode::from(1)
@@ -164,6 +188,10 @@ pub fn main() -> ExitCode {
         Err(Failure::Usage(message)) => {
             eprintln!("error: {message}");
             ExitCode::from(2)
+        }
+        Err(Failure::Check(message)) => {
+            eprintln!("{message}");
+            ExitCode::from(3)
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::output::{number, numbers};
 use super::{Failure, Global, Outcome, output};
-use crate::closure::{ClosureTree, Node, NodeId};
+use crate::closure::{ClosureTree, Fate, LayeringRule, Node, NodeId};
+use crate::engine::Material;
 use crate::globals::Globals;
 use crate::lobes::LobeKind;
 use crate::lobes::registry::ParamTy;
@@ -13,7 +14,7 @@ use std::path::Path;
 /// Deeper documents overflow the stack of those who write and read them.
 const MAX_DEPTH: u32 = 1000;
 
-pub fn run(global: &Global, file: &Path) -> Outcome {
+pub fn run(global: &Global, file: &Path, explain: bool) -> Outcome {
     let material = global.material(file, &[])?;
     let tree = material.tree(&Globals::default())?;
     let depth = tree.size(tree.root()).depth;
@@ -23,11 +24,57 @@ pub fn run(global: &Global, file: &Path) -> Outcome {
         )));
     }
     if global.json {
-        return output::json(&json!({ "shader": material.name(), "closure": node(&tree, tree.root()) }));
+        let mut document = json!({ "shader": material.name(), "closure": node(&tree, tree.root()) });
+        if explain {
+            document["layering"] = layering(&material);
+        }
+        return output::json(&document);
     }
     let mut text = format!("{}\n", material.name());
     outline(&tree, &mut text);
+    if explain {
+        layering_text(&layering(&material), &mut text);
+    }
     output::write(&text)
+}
+
+/// By which rule layers scale what lies below them, and where `balanced` is not to be had, why.
+fn layering(material: &Material) -> Value {
+    let rule = match material.layering().rule {
+        LayeringRule::Min => "min",
+        LayeringRule::View => "view",
+        LayeringRule::Balanced => "balanced",
+    };
+    let Some(balance) = material.balance() else { return json!({ "rule": rule }) };
+    let lobes = balance.fates().into_iter().filter_map(|(kind, fate)| {
+        let name = kind.spec().name;
+        match fate {
+            Fate::Uncovered => None,
+            Fate::Balanced => Some(json!({ "lobe": name, "rule": "balanced" })),
+            Fate::Min(why) => Some(json!({ "lobe": name, "rule": "min", "why": why.reason() })),
+        }
+    });
+    if material.program().is_constant() {
+        return json!({ "rule": rule, "lobes": lobes.collect::<Vec<_>>() });
+    }
+    let sites = material.program().sites();
+    let name = |site: u32| sites[site as usize].kind.spec().name;
+    let pairs =
+        balance.pairs().into_iter().map(|(t, b)| json!({ "lobe": name(b), "below": name(t), "rule": "balanced" }));
+    json!({ "rule": rule, "varies": true, "lobes": pairs.collect::<Vec<_>>() })
+}
+
+fn layering_text(layering: &Value, text: &mut String) {
+    let word = |v: &Value| v.as_str().unwrap_or("").to_owned();
+    let _ = writeln!(text, "layers scale by {}", word(&layering["rule"]));
+    for lobe in layering["lobes"].as_array().into_iter().flatten() {
+        let below = lobe["below"].as_str().map_or(String::new(), |top| format!(" below {top}"));
+        let why = lobe["why"].as_str().map_or(String::new(), |why| format!(": {why}"));
+        let _ = writeln!(text, "  {}{below}: {}{why}", word(&lobe["lobe"]), word(&lobe["rule"]));
+    }
+    if layering["varies"] == true {
+        text.push_str("  everything else, where the tree varies: min\n");
+    }
 }
 
 /// What an unfinished node waits for.

@@ -347,15 +347,15 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         result
     }
 
-    /// Like `eval` (or `eval_adjoint`) with only the lobes whose normal `pick` accepts.
-    pub(crate) fn part(&self, wi: V3<S>, adjoint: bool, pick: impl Fn(V3<S>) -> bool) -> Rgb<S> {
+    /// Like `eval` (or `eval_adjoint`) with only the lobes whose frame and kind `pick` accepts.
+    pub(crate) fn part(&self, wi: V3<S>, adjoint: bool, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
         let cosine = if adjoint { Cosine::View } else { Cosine::Light };
         let mut sum = [S::zero(); 3];
         self.walk(
             wi,
             false,
             |_, l, scale, local| {
-                if pick(self.frames[l.frame as usize].n) {
+                if pick(&self.frames[l.frame as usize], l.kind) {
                     let part = weighted(l, scale, local, cosine);
                     for c in 0..3 {
                         sum[c] += part[c];

@@ -199,9 +199,10 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         }
         let albedo = lobe.albedo(wo, curve);
         let share: Rgb<S> = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
-        // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums estimates in place of bounds.
+        // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
-        self.stack.lobe(w.in_top, if view { albedo } else { lobe.albedo_bound(wo, curve) });
+        let bound = if view { lobe.view_bound(wo, curve) } else { lobe.albedo_bound(wo, curve) };
+        self.stack.lobe(w.in_top, bound);
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
             self.chained(|chain| chain.lobe(&visit, normal, param));

@@ -7,7 +7,7 @@ pub mod layer;
 pub mod tree;
 mod walk;
 
-pub use balance::{Balance, Balancer, Unbalanced};
+pub use balance::{Balance, Balancer, Fate, Unbalanced};
 pub use bsdf::{Bsdf, Eval, Sample, SampleFlags};
 pub use flatten::{Curves, Layering, Tables, flatten};
 pub use layer::{LayeringRule, TintRule};

@@ -201,6 +201,11 @@ impl ClosureTree {
         self.nodes[id.index()]
     }
 
+    /// The node made at this place, counted from the black one.
+    pub(crate) fn id_at(&self, index: usize) -> NodeId {
+        NodeId(index as u32)
+    }
+
     /// Number of nodes made, reachable or not.
     pub fn len(&self) -> usize {
         self.nodes.len()

@@ -1,11 +1,13 @@
 //! The functions and constants every script has: a table, one line per overload.
 //!
 //! A signature is a result and its arguments in letters: `f` float, `i` int, `c` color, `p` point, `v` vector, `n`
-//! normal, `s` string, `C` closure; `g` is float or any triple, the same throughout the line, and `t` any triple. Where
+//! normal, `s` string, `C` closure, `N` the name of a noise, `S` of a color space; `g` is float or any triple, the same
+//! throughout the line, and `t` any triple. Where
 //! several lines share a name the one with the fewest conversions is meant, the first among equals. The functions are
 //! total: like OSL's they return something sensible where mathematics has no answer.
 
 use super::body::{Cells, GlobalVar};
+use super::functions::{color, noise};
 use super::ops::divide;
 use super::types::Ty;
 use std::collections::HashMap;
@@ -26,10 +28,22 @@ pub enum Eval {
     I3(fn(i32, i32, i32) -> i32),
     /// On whole values.
     All(fn(&[Cells]) -> Cells),
+    /// Noise of the kind with this number, or of the kind that the first argument names. As OSL has it, the result is a
+    /// float or a triple as the place asks.
+    Noise(Option<usize>, Repeats),
     /// Reads the shading point.
     Global(GlobalVar),
     /// a·(1−x) + b·x of closures.
     MixClosures,
+}
+
+/// Whether a noise takes periods after its coordinates.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Repeats {
+    /// It goes on for ever.
+    Never,
+    /// One period per coordinate follows.
+    Periodic,
 }
 
 /// One overload.
@@ -42,7 +56,7 @@ pub struct Builtin {
 }
 
 /// The most arguments an overload takes.
-pub const MAX_ARGS: usize = 4;
+pub const MAX_ARGS: usize = 5;
 
 impl Builtin {
     /// The result and argument types, one list for each reading of `g` or `t`.
@@ -63,13 +77,51 @@ impl Builtin {
                 'p' => Ty::Point,
                 'v' => Ty::Vector,
                 'n' => Ty::Normal,
-                's' => Ty::String,
+                's' | 'N' | 'S' => Ty::String,
                 'C' => Ty::Closure,
                 _ => *any,
             });
             let result = types.next().unwrap_or(Ty::Poison);
             (result, types.collect())
         })
+    }
+
+    /// The words that argument `index` may be, where it is one of a list.
+    pub fn options(&self, index: usize) -> Option<&'static [&'static str]> {
+        match self.sig.as_bytes().get(index + 1)? {
+            b'N' => Some(noise::KINDS),
+            b'S' => Some(color::SPACES),
+            _ => None,
+        }
+    }
+
+    /// Whether the result may be a triple in place of a float.
+    pub fn result_follows_use(&self) -> bool {
+        matches!(self.eval, Eval::Noise(..))
+    }
+
+    fn noise(&self, kind: Option<usize>, repeats: Repeats, n: usize, args: &[Cells]) -> Cells {
+        let named = usize::from(kind.is_none());
+        let kind = kind.unwrap_or_else(|| args.first().map_or(0, |a| f32::from_bits(a[0]) as usize));
+        let mut numbers = [0.0; 8];
+        let mut count = 0;
+        for (letter, arg) in self.sig.bytes().skip(1).zip(args).skip(named) {
+            for cell in &arg[..if letter == b'p' { 3 } else { 1 }] {
+                numbers[count] = f32::from_bits(*cell);
+                count += 1;
+            }
+        }
+        let dimensions = if repeats == Repeats::Periodic { count / 2 } else { count };
+        let mut at = noise::At { x: [0.0; 4], n: dimensions, period: [0.0; 4] };
+        at.x[..dimensions].copy_from_slice(&numbers[..dimensions]);
+        if repeats == Repeats::Periodic {
+            at.period[..dimensions].copy_from_slice(&numbers[dimensions..count]);
+        }
+        let mut out = [0; 3];
+        for (channel, cell) in out.iter_mut().enumerate().take(n) {
+            *cell = noise::noise(kind, &at, channel as u32).to_bits();
+        }
+        out
     }
 
     /// As documentation would show it; `g` reads `type`.
@@ -81,7 +133,7 @@ impl Builtin {
             'p' => "point",
             'v' => "vector",
             'n' => "normal",
-            's' => "string",
+            's' | 'N' | 'S' => "string",
             'C' => "closure color",
             _ => "TYPE",
         };
@@ -106,6 +158,7 @@ impl Builtin {
             Eval::I2(f) => [f(int(0), int(1)) as u32, 0, 0],
             Eval::I3(f) => [f(int(0), int(1), int(2)) as u32, 0, 0],
             Eval::All(f) => f(args),
+            Eval::Noise(kind, repeats) => self.noise(kind, repeats, n, args),
             Eval::Global(_) | Eval::MixClosures => [0; 3],
         }
     }
@@ -115,7 +168,8 @@ const fn line(name: &'static str, sig: &'static str, eval: Eval) -> Builtin {
     Builtin { name, sig, eval }
 }
 
-use Eval::{All, F1, F2, F3, I2, I3};
+use Eval::{All, F1, F2, F3, I2, I3, Noise};
+use Repeats::{Never, Periodic};
 
 /// Every overload. The index of a line is its number in the program.
 pub static BUILTINS: &[Builtin] = &[
@@ -193,6 +247,63 @@ pub static BUILTINS: &[Builtin] = &[
     line("faceforward", "vvvv", All(|a| cells(face_forward(triple(a, 0), triple(a, 1), triple(a, 2))))),
     line("luminance", "fc", All(|a| scalar(dot(triple(a, 0), [0.2126, 0.7152, 0.0722])))),
     line("backfacing", "i", Eval::Global(GlobalVar::Backfacing)),
+    line("noise", "ff", Noise(Some(0), Never)),
+    line("noise", "fff", Noise(Some(0), Never)),
+    line("noise", "fp", Noise(Some(0), Never)),
+    line("noise", "fpf", Noise(Some(0), Never)),
+    line("noise", "fNf", Noise(None, Never)),
+    line("noise", "fNff", Noise(None, Never)),
+    line("noise", "fNp", Noise(None, Never)),
+    line("noise", "fNpf", Noise(None, Never)),
+    line("snoise", "ff", Noise(Some(2), Never)),
+    line("snoise", "fff", Noise(Some(2), Never)),
+    line("snoise", "fp", Noise(Some(2), Never)),
+    line("snoise", "fpf", Noise(Some(2), Never)),
+    line("cellnoise", "ff", Noise(Some(4), Never)),
+    line("cellnoise", "fff", Noise(Some(4), Never)),
+    line("cellnoise", "fp", Noise(Some(4), Never)),
+    line("cellnoise", "fpf", Noise(Some(4), Never)),
+    line("hashnoise", "ff", Noise(Some(5), Never)),
+    line("hashnoise", "fff", Noise(Some(5), Never)),
+    line("hashnoise", "fp", Noise(Some(5), Never)),
+    line("hashnoise", "fpf", Noise(Some(5), Never)),
+    line("pnoise", "fff", Noise(Some(0), Periodic)),
+    line("pnoise", "fffff", Noise(Some(0), Periodic)),
+    line("pnoise", "fpp", Noise(Some(0), Periodic)),
+    line("pnoise", "fpfpf", Noise(Some(0), Periodic)),
+    line("pnoise", "fNff", Noise(None, Periodic)),
+    line("pnoise", "fNffff", Noise(None, Periodic)),
+    line("pnoise", "fNpp", Noise(None, Periodic)),
+    line("pnoise", "fNpfpf", Noise(None, Periodic)),
+    line("psnoise", "fff", Noise(Some(2), Periodic)),
+    line("psnoise", "fffff", Noise(Some(2), Periodic)),
+    line("psnoise", "fpp", Noise(Some(2), Periodic)),
+    line("psnoise", "fpfpf", Noise(Some(2), Periodic)),
+    line("hash", "ii", All(|a| [noise::hash_int([a[0][0], 0, 0, 0], 1), 0, 0])),
+    line("hash", "if", All(|a| [noise::hash_int([a[0][0], 0, 0, 0], 1), 0, 0])),
+    line("hash", "iff", All(|a| [noise::hash_int([a[0][0], a[1][0], 0, 0], 2), 0, 0])),
+    line("hash", "ip", All(|a| [noise::hash_int([a[0][0], a[0][1], a[0][2], 0], 3), 0, 0])),
+    line("hash", "ipf", All(|a| [noise::hash_int([a[0][0], a[0][1], a[0][2], a[1][0]], 4), 0, 0])),
+    line(
+        "transformc",
+        "cSSc",
+        All(|a| cells(color::transform(float(a, 0) as usize, float(a, 1) as usize, triple(a, 2)))),
+    ),
+    line("transformc", "cSc", All(|a| cells(color::transform(float(a, 0) as usize, 0, triple(a, 1))))),
+    line("logb", "gg", F1(|x| if x == 0.0 { -f32::MAX } else { x.abs().log2().floor() })),
+    line("erf", "ff", F1(|x| statrs::function::erf::erf(f64::from(x)) as f32)),
+    line("erfc", "ff", F1(|x| statrs::function::erf::erfc(f64::from(x)) as f32)),
+    line("refract", "vvvf", All(|a| cells(refract(triple(a, 0), triple(a, 1), float(a, 2))))),
+    line("rotate", "ppfv", All(|a| cells(rotate(triple(a, 0), float(a, 1), [0.0; 3], triple(a, 2))))),
+    line(
+        "rotate",
+        "ppfpp",
+        All(|a| {
+            let (from, to) = (triple(a, 2), triple(a, 3));
+            cells(rotate(triple(a, 0), float(a, 1), from, minus(to, from)))
+        }),
+    ),
+    line("distance", "fppp", All(|a| scalar(to_segment(triple(a, 0), triple(a, 1), triple(a, 2))))),
 ];
 
 /// Named numbers.
@@ -224,14 +335,11 @@ pub const UNSUPPORTED: &[&str] = &[
     "blackbody",
     "bump",
     "calculatenormal",
-    "cellnoise",
     "concat",
     "determinant",
     "displace",
     "endswith",
     "environment",
-    "erf",
-    "erfc",
     "error",
     "filterwidth",
     "format",
@@ -242,24 +350,15 @@ pub const UNSUPPORTED: &[&str] = &[
     "getmatrix",
     "getmessage",
     "gettextureinfo",
-    "hash",
-    "hashnoise",
     "isconnected",
-    "logb",
-    "noise",
-    "pnoise",
     "pointcloud_get",
     "pointcloud_search",
     "printf",
-    "psnoise",
     "random",
     "raytype",
-    "refract",
     "regex_match",
     "regex_search",
-    "rotate",
     "setmessage",
-    "snoise",
     "spline",
     "splineinverse",
     "split",
@@ -273,7 +372,6 @@ pub const UNSUPPORTED: &[&str] = &[
     "texture3d",
     "trace",
     "transform",
-    "transformc",
     "transformu",
     "transpose",
     "warning",
@@ -379,4 +477,31 @@ fn reflect(i: [f32; 3], n: [f32; 3]) -> [f32; 3] {
 
 fn face_forward(n: [f32; 3], i: [f32; 3], reference: [f32; 3]) -> [f32; 3] {
     if dot(i, reference) < 0.0 { n } else { n.map(|x| -x) }
+}
+
+/// The direction refracted at a plane with unit normal n; 0 where it is reflected totally.
+fn refract(i: [f32; 3], n: [f32; 3], eta: f32) -> [f32; 3] {
+    let cos = dot(i, n);
+    let rest = 1.0 - eta * eta * (1.0 - cos * cos);
+    if rest < 0.0 {
+        return [0.0; 3];
+    }
+    let along = eta * cos + rest.sqrt();
+    std::array::from_fn(|k| eta * i[k] - along * n[k])
+}
+
+/// A point turned by an angle about the axis through `from` along `axis` (Rodrigues).
+fn rotate(p: [f32; 3], angle: f32, from: [f32; 3], axis: [f32; 3]) -> [f32; 3] {
+    let k = normalize(axis);
+    let v = minus(p, from);
+    let (sin, cos) = angle.sin_cos();
+    let (side, along) = (cross(k, v), dot(k, v) * (1.0 - cos));
+    std::array::from_fn(|c| from[c] + v[c] * cos + side[c] * sin + k[c] * along)
+}
+
+/// The distance from the segment ab to q.
+fn to_segment(a: [f32; 3], b: [f32; 3], q: [f32; 3]) -> f32 {
+    let (line, to) = (minus(b, a), minus(q, a));
+    let t = clamp(divide(dot(line, to), dot(line, line)), 0.0, 1.0);
+    length(minus(to, line.map(|x| x * t)))
 }

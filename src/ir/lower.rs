@@ -5,6 +5,7 @@
 //! takes the place where its operands began. `&&`, `||` and `? :` become jumps.
 
 use super::body::{Body, ExprId, ExprKind, Op, Root, Stmt, VarId};
+use super::passes::layers::Layers;
 use super::passes::needs::Needs;
 use super::program::{Instr, Program, Site};
 use super::types::Ty;
@@ -12,10 +13,12 @@ use crate::diag::Diagnostic;
 use std::collections::HashMap;
 
 /// Lowers a body whose live expressions are marked in `needs`.
-pub fn lower(body: &Body, needs: &Needs, warnings: Vec<Diagnostic>) -> Program {
+pub fn lower(body: &Body, needs: &Needs, layers: &Layers, warnings: Vec<Diagnostic>) -> Program {
     let mut lower = Lower::new(body, needs);
     lower.block(&body.stmts);
     let strings = body.strings.clone();
+    let site = |id: ExprId| lower.site_of.get(&id.0).copied();
+    let layer_pairs = layers.pairs().into_iter().filter_map(|(top, base)| Some((site(top)?, site(base)?))).collect();
     Program {
         code: lower.code,
         args: lower.args,
@@ -24,6 +27,7 @@ pub fn lower(body: &Body, needs: &Needs, warnings: Vec<Diagnostic>) -> Program {
         closures: lower.max_closures as usize,
         ci: lower.closure_vars[VarId::CI.index()],
         sites: lower.sites,
+        layer_pairs,
         strings,
         globals: needs.globals.iter().copied().collect(),
         constant: !needs.varying,
@@ -71,6 +75,8 @@ struct Lower<'a> {
     max_closures: u32,
     values: Vec<Reg>,
     sites: Vec<Site>,
+    /// The site of each lobe expression.
+    site_of: HashMap<u32, u32>,
 }
 
 impl<'a> Lower<'a> {
@@ -89,6 +95,7 @@ impl<'a> Lower<'a> {
             max_closures: 1,
             values: Vec::new(),
             sites: Vec::new(),
+            site_of: HashMap::new(),
         };
         lower.closure_vars[VarId::CI.index()] = lower.closure();
         let mut placed = vec![false; body.vars.len()];
@@ -307,6 +314,7 @@ impl<'a> Lower<'a> {
                     }
                 }
                 let site = self.sites.len() as u32;
+                self.site_of.insert(id.0, site);
                 self.sites.push(Site { kind, values, span: expr.span });
                 Instr::Lobe { kind, site, dst, args: start }
             }

@@ -5,12 +5,12 @@
 //! reads is dropped, and what remains is a list of register instructions that [`Program::shade`] runs at a point.
 //! This module knows closures by their signatures only; what a lobe does with light is never seen here.
 
-mod body;
-mod builtins;
+pub(crate) mod body;
+pub(crate) mod builtins;
 mod check;
+mod functions;
 mod lower;
-mod ops;
-mod pairs;
+pub(crate) mod ops;
 mod passes;
 mod program;
 mod shader;
@@ -22,6 +22,7 @@ pub use shader::{CheckedShader, ParamDecl, Value};
 pub use types::Ty;
 
 use crate::diag::Diagnostic;
+use crate::lobes::registry::Form;
 
 /// Compiles a script. `name` names it in messages, and the shader where the script does not.
 ///
@@ -30,6 +31,18 @@ use crate::diag::Diagnostic;
 /// # Errors
 /// All errors found, with warnings after them.
 pub fn compile(name: &str, source: &str) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
+    compile_with(name, source, &[])
+}
+
+/// The same for a host that brings along closures of its own.
+///
+/// # Errors
+/// All errors found, with warnings after them.
+pub fn compile_with(
+    name: &str,
+    source: &str,
+    hosts: &[Form],
+) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
     let ast = crate::syntax::parse(source)?;
-    check::check(name, &ast)
+    check::check(name, &ast, hosts)
 }

@@ -108,6 +108,7 @@ pub struct Program {
     pub(super) closures: usize,
     pub(super) ci: u32,
     pub(super) sites: Vec<Site>,
+    pub(super) layer_pairs: Vec<(u32, u32)>,
     pub(super) strings: Vec<String>,
     pub(super) globals: Vec<GlobalVar>,
     pub(super) constant: bool,
@@ -130,6 +131,12 @@ impl Program {
     /// One entry for each place that makes a lobe; [`ClosureTree::lobe`] receives the index.
     pub fn sites(&self) -> &[Site] {
         &self.sites
+    }
+
+    /// Every pair of sites (top, base) such that the lobe made at `top` may be a whole top, and the one made at `base`
+    /// lie below it and below no other layer. May name pairs that never come about.
+    pub fn layer_pairs(&self) -> &[(u32, u32)] {
+        &self.layer_pairs
     }
 
     /// Number of instructions.

@@ -1,9 +1,9 @@
 //! A checked shader and its parameters, and how to fix them.
 
-use super::body::{Body, Cells, VarId};
+use super::body::{Body, Cells, ExprKind, VarId};
 use super::check::suggest;
 use super::lower;
-use super::passes::{dead, fold, needs};
+use super::passes::{dead, fold, layers, needs};
 use super::program::Program;
 use super::types::Ty;
 use crate::diag::Diagnostic;
@@ -52,7 +52,7 @@ impl Value {
         }
     }
 
-    pub(super) fn from_cells(ty: Ty, cells: Cells, strings: &[String]) -> Value {
+    pub(crate) fn from_cells(ty: Ty, cells: Cells, strings: &[String]) -> Value {
         let triple = cells.map(f32::from_bits);
         match ty {
             Ty::Int => Value::Int(cells[0] as i32),
@@ -66,7 +66,7 @@ impl Value {
     }
 
     /// The bits of this value as a `ty`, if it can be one.
-    fn to_cells(&self, ty: Ty, strings: &mut Vec<String>) -> Option<Cells> {
+    pub(crate) fn to_cells(&self, ty: Ty, strings: &mut Vec<String>) -> Option<Cells> {
         match (self, ty) {
             (Value::Int(i), Ty::Int) => Some([*i as u32, 0, 0]),
             (Value::Float(x), Ty::Int) if x.fract() == 0.0 && x.abs() < 2e9 => Some([*x as i32 as u32, 0, 0]),
@@ -106,7 +106,7 @@ pub struct ParamDecl {
     pub metadata: Vec<(String, Value)>,
     /// Where its name stands.
     pub span: Span,
-    pub(super) var: VarId,
+    pub(crate) var: VarId,
 }
 
 impl ParamDecl {
@@ -120,10 +120,10 @@ impl ParamDecl {
 #[derive(Clone, Debug)]
 pub struct CheckedShader {
     pub(super) name: String,
-    pub(super) span: Span,
+    pub(crate) span: Span,
     pub(super) params: Vec<ParamDecl>,
     pub(super) metadata: Vec<(String, Value)>,
-    pub(super) body: Body,
+    pub(crate) body: Body,
 }
 
 impl CheckedShader {
@@ -174,7 +174,18 @@ impl CheckedShader {
         if !needs.errors.is_empty() {
             return Err(needs.errors);
         }
-        Ok(lower::lower(&body, &needs, warnings))
+        let layers = layers::layers(&body);
+        for top in layers.tops() {
+            let expr = body.expr(top);
+            if let ExprKind::Lobe(kind, _) = expr.kind
+                && kind.transmits()
+            {
+                let message = format!("what `{}` transmits counts as spent in a top", kind.spec().name);
+                let d = Diagnostic::warning("W0504", expr.span, message);
+                warnings.push(d.help("the base gets nothing of it; a sum, or a weight on the top, lets it through"));
+            }
+        }
+        Ok(lower::lower(&body, &needs, &layers, warnings))
     }
 
     /// The program with every parameter left open: read from memory at every point instead of folded away. What
@@ -182,10 +193,10 @@ impl CheckedShader {
     pub fn unspecialised(&self) -> Program {
         let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
         let body = dead::remove(fold::fold_open(&self.body, &open));
-        lower::lower(&body, &needs::needs(&body), Vec::new())
+        lower::lower(&body, &needs::needs(&body), &layers::layers(&body), Vec::new())
     }
 
-    fn unknown_parameter(&self, name: &str) -> Diagnostic {
+    pub(crate) fn unknown_parameter(&self, name: &str) -> Diagnostic {
         let d = Diagnostic::error("E0401", self.span, format!("`{}` has no parameter `{name}`", self.name));
         let names = || self.params.iter().map(|p| p.name.as_str());
         match suggest(name, names()) {

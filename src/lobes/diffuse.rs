@@ -1,5 +1,6 @@
 //! Lambertian reflection.
 
+use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
@@ -25,6 +26,10 @@ pub struct Diffuse<S> {
 
 impl<S: Real> Lobe<S> for Diffuse<S> {
     type Params = DiffuseParams;
+
+    fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        Some(Limits::above(cos, 1.0, 1.0))
+    }
 
     fn new(_: &DiffuseParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) }

@@ -1,5 +1,6 @@
 //! Light the surface gives off.
 
+use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
@@ -30,6 +31,10 @@ impl<S: Real> Emission<S> {
 
 impl<S: Real> Lobe<S> for Emission<S> {
     type Params = EmissionParams;
+
+    fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
+        Some(Limits { lowest: 0.0, highest: 0.0 })
+    }
 
     fn new(_: &EmissionParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         Emission { radiance: S::select(wo.z.gt(S::zero()), S::one(), S::zero()) }

@@ -9,9 +9,10 @@
 //! difference, so that nothing cancels at grazing angles, and it is sampled by a transformed cosine that keeps the
 //! horizon in place, mixed with a uniform share ([`super::ltc`]), where the paper clips one that does not.
 
+use super::limits::{Limits, SlotRange};
 use super::ltc::Ltc;
 use super::ltc_tables::EON;
-use super::registry::closure;
+use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Lift, Real, V3};
@@ -84,6 +85,15 @@ impl<S: Real> Eon<S> {
 
 impl<S: Real> Lobe<S> for Eon<S> {
     type Params = EonParams;
+
+    /// E = ρ·E₁ + ρms·(1 − E₁) with ρms = ρ²m/(1 − ρ(1 − m)) ≤ ρ: never above ρ.
+    fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        Some(Limits::above(cos, 0.0, 1.0))
+    }
+
+    fn tint_slot() -> Option<usize> {
+        EonParams::SPEC.slot_of("albedo")
+    }
 
     fn new(params: &EonParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         let r = S::from_f32(params.roughness);

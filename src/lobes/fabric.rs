@@ -177,6 +177,7 @@ impl<S: Real> Lobe<S> for Fabric<S> {
             detail: 1.0,
             margin: 0.0,
             mirrored: true,
+            weave: None,
         }))
     }
 

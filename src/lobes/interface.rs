@@ -133,10 +133,19 @@ impl<S: Real> Interface<S> {
         (h, jacobian, passed)
     }
 
+    /// F of the facet that mirrors ωo to ωi.
     #[inline(always)]
-    fn reflectance<L: Real + Lift<S>>(&self, h: V3<L>) -> L {
-        let far = L::lift(self.far);
-        fresnel::dielectric((far - L::one()) * (far + L::one()), L::c(0.5) * h.length_squared().sqrt())
+    fn reflectance<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let wo = V3::<L>::lift(self.wo);
+        let eta = self.eta;
+        // In double precision, because toward the critical angle the sum for g² cancels.
+        let [m, c, g2] = L::by_lane([wo.x, wo.y, wo.z, wi.x, wi.y, wi.z, L::lift(self.side)], |v| {
+            let far = if v[6] > 0.0 { eta } else { 1.0 / eta };
+            let m = (far - 1.0) * (far + 1.0);
+            let c2 = 0.25 * ((v[0] + v[3]).powi(2) + (v[1] + v[4]).powi(2) + (v[2] + v[5]).powi(2)).min(4.0);
+            [m, c2.sqrt(), c2 + m]
+        });
+        fresnel::dielectric_at(m, c, g2)
     }
 
     #[inline(always)]
@@ -145,7 +154,7 @@ impl<S: Real> Interface<S> {
         let (same, other) = self.sides(wi);
         let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
         let h = wo + wi;
-        let back = self.reflectance(h) * self.facets.d(h) * L::c(0.5) / shadowed;
+        let back = self.reflectance(wi) * self.facets.d(h) * L::c(0.5) / shadowed;
         let (h, jacobian, passed) = self.refraction(wi);
         let on = passed * jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
         let missing = tables.missing(wi, self.facets.alpha());
@@ -170,7 +179,7 @@ impl<S: Real> Interface<S> {
         let (same, other) = self.sides(wi);
         let (cos_o, proposal) = (wo.z.abs(), L::lift(self.proposal));
         let h = wo + wi;
-        let back = self.chance(self.reflectance(h)) * self.facets.mirrored_pdf(h, cos_o, proposal);
+        let back = self.chance(self.reflectance(wi)) * self.facets.mirrored_pdf(h, cos_o, proposal);
         let (h, jacobian, passed) = self.refraction(wi);
         let density = L::c(4.0) * jacobian * self.facets.mirrored_pdf(h, cos_o, proposal);
         let on = (L::one() - self.chance(L::one() - passed)) * density;

@@ -8,11 +8,10 @@
 //! The presets are *recalled* from the paper's Table II by way of third-party transcriptions, not read from it, and the
 //! segments of the offset curves are taken as equally long.
 
-use super::cloth::{self, Cloth, EVENLY, TANGENTS, Yarn, weights};
+use super::cloth::{self, ClothParams, EVENLY, FLAT, TANGENTS, Woven, Yarn, weights};
 use super::registry::{ClosureParams, closure};
-use super::{Lobe, Rgb};
-use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::albedo::{COMPONENTS, FibreKey, TableSpec};
+use crate::optics::V3;
 
 closure! {
     /// Woven cloth of two families of dielectric threads, one along T, one across it. One-sided: black below the
@@ -43,8 +42,6 @@ const fn yarn(
     Yarn { color, eta, kd, gamma_s, gamma_v, cover, lo: ends[0], hi: ends[1], weights }
 }
 
-/// All threads flat.
-const FLAT: &[f64; TANGENTS] = &[1.0, 0.0, 0.0, 0.0, 0.0];
 const CREPE: &[f64; TANGENTS] = &weights(&[-35.0, -35.0, 35.0, 35.0]);
 const SATIN: &[f64; TANGENTS] = &weights(&[-32.0, -32.0, -18.0, 0.0, 0.0, 18.0, 32.0, 32.0]);
 const SHOT: &[f64; TANGENTS] = &weights(&[-25.0, -25.0, 25.0, 25.0]);
@@ -72,22 +69,17 @@ static PRESETS: [[Yarn; 2]; 5] = [
 ];
 
 /// See [`MicrocylinderParams`].
-#[derive(Clone, Copy, Debug)]
-pub struct Microcylinder<S> {
-    cloth: Cloth<S>,
-}
+pub type Microcylinder<S> = Woven<S, MicrocylinderParams>;
 
 fn preset(index: usize) -> &'static [Yarn; 2] {
     &PRESETS[index.min(PRESETS.len() - 1)]
 }
 
 fn kernel(key: &FibreKey, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
-    cloth::integrate(preset(key[0] as usize), wo, wi, out);
+    cloth::integrate(preset(key[0] as usize), key[15] as usize, wo, wi, out);
 }
 
-impl<S: Real> Lobe<S> for Microcylinder<S> {
-    type Params = MicrocylinderParams;
-
+impl ClothParams for MicrocylinderParams {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let spec = MicrocylinderParams::SPEC;
         let index = spec.params[2].clamp(0, values[spec.slot_of("preset")?]?) as usize;
@@ -96,51 +88,7 @@ impl<S: Real> Lobe<S> for Microcylinder<S> {
         Some(cloth::table(kernel, key, preset(index)))
     }
 
-    fn new(params: &MicrocylinderParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-        Microcylinder { cloth: Cloth::new(preset(params.preset as usize), wo, curve) }
-    }
-
-    #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.f(wi, curve)
-    }
-
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        self.cloth.pdf(wi)
-    }
-
-    fn sample(&self, u: [S; 2]) -> V3<S> {
-        self.cloth.sample(u)
-    }
-
-    /// Exact where f is not divided, as for most presets; where it is, an upper estimate, as for `thread`.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-        self.cloth.albedo(w, curve)
-    }
-
-    #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.cloth.albedo_bound(w, curve)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::albedo::Precision;
-
-    #[test]
-    fn a_varying_preset_is_bounded() {
-        for index in 0..PRESETS.len() {
-            let mut values = [Some(0.0f32); 7];
-            values[6] = Some(index as f32);
-            let curve = Microcylinder::<f32>::table(&values).expect("known").bake::<f64>(Precision::FAST);
-            for k in 0..2000 {
-                let (z, turn) = ((k % 40) as f64 / 40.0 + 1e-3, (k / 40) as f64 * 0.1257);
-                let bound = curve.fibre().bound(V3::polar(z.powi(2), turn), 0.0);
-                let limit = cloth::WHOLE_RANGE / z.powi(2).max(0.02);
-                assert!(bound.iter().all(|b| *b < limit), "{index} {z} {turn}: {bound:?}");
-            }
-        }
+    fn yarns(&self) -> [Yarn; 2] {
+        *preset(self.preset as usize)
     }
 }

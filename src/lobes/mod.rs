@@ -10,6 +10,7 @@ pub mod registry;
 
 mod charlie_terms;
 mod cloth;
+mod cloth_range;
 pub mod conductor;
 pub mod cylinder;
 pub mod dielectric;
@@ -17,9 +18,12 @@ pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
+pub mod host;
 mod interface;
+pub mod limits;
 mod ltc_tables;
 pub mod microcylinder;
+pub mod microcylinder_threads;
 pub mod microfacet;
 pub mod oren_nayar;
 mod rough;
@@ -33,6 +37,7 @@ pub mod velvet;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
+use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
 /// A value per colour channel.
@@ -108,6 +113,25 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
+    /// Never below E_view(ω), on ω's own side: [`albedo_bound`](Lobe::albedo_bound), unless a lobe that is not
+    /// reciprocal has a tighter one.
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        self.albedo_bound(w, curve)
+    }
+
+    /// How small and how large the albedo may be over whole ranges of parameters, `(lowest, highest)` per slot as given
+    /// (not yet clamped), and of cosines to the lobe's normal. `None`: to be read off the table.
+    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        let _ = (ranges, cos);
+        None
+    }
+
+    /// The first slot of a color that the albedo is at most proportional to: the lobe's [`weight`](Lobe::weight), or a
+    /// reflectance that bounds it. [`limits`](Lobe::limits) leaves it out.
+    fn tint_slot() -> Option<usize> {
+        None
+    }
+
     /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
@@ -118,26 +142,32 @@ macro_rules! lobes {
     ($( $module:ident :: $Lobe:ident ),* $(,)?) => {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        #[repr(u16)]
-        pub enum LobeKind { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe ),* }
+        pub enum LobeKind {
+            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe, )*
+            /// A closure that a host brought along.
+            Host(host::HostKind),
+        }
 
         impl LobeKind {
-            /// Every lobe there is.
+            /// Every built-in lobe.
             pub const ALL: &[LobeKind] = &[ $( LobeKind::$Lobe ),* ];
 
             /// The lobe's declaration.
             pub fn spec(self) -> &'static LobeSpec {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC ),* }
+                match self {
+                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC, )*
+                    LobeKind::Host(host) => host.spec(),
+                }
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
             pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values) ),* }
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values), )* LobeKind::Host(_) => None }
             }
 
             /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values) ),* }
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values), )* LobeKind::Host(_) => None }
             }
 
             /// Whether a lobe with these parameter values is reciprocal.
@@ -145,15 +175,28 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
-                } ),* }
+                }, )* LobeKind::Host(host) => host.spec().reciprocal }
             }
 
-            /// Whether f of a lobe with these parameter values depends on where its tangent points.
+            fn closed_limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+                match self {
+                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::limits(ranges, cos), )*
+                    LobeKind::Host(host) => Some(Limits { lowest: 0.0, highest: host.albedo_at_most().into() }),
+                }
+            }
+
+            /// See [`Lobe::tint_slot`].
+            pub fn tint_slot(self) -> Option<usize> {
+                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
+            }
+
+            /// Whether f of a lobe with these parameter values depends on where its tangent points; of a host's lobe that
+            /// is not known.
             pub fn follows_tangent(self, values: &[f32]) -> bool {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::follows_tangent(&params)
-                } ),* }
+                }, )* LobeKind::Host(_) => true }
             }
 
             /// See [`Lobe::between_media`].
@@ -161,7 +204,7 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::between_media(&params)
-                } ),* }
+                }, )* LobeKind::Host(_) => false }
             }
 
             /// The color that multiplies a lobe with these parameter values.
@@ -169,54 +212,65 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::weight(&params)
-                } ),* }
+                }, )* LobeKind::Host(_) => [1.0; 3] }
             }
         }
 
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
-        pub enum AnyLobe<S: Real> { $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>) ),* }
+        pub enum AnyLobe<S: Real> {
+            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>), )*
+            /// See [`host::HostLobe`].
+            Host(host::Host<S>),
+        }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
             pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-                match kind { $( LobeKind::$Lobe => AnyLobe::$Lobe(
-                    <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)) ),* }
+                match kind {
+                    $( LobeKind::$Lobe => AnyLobe::$Lobe(
+                        <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)), )*
+                    LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
+                }
             }
             /// See [`Lobe::f`].
             #[inline]
             pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve), )* AnyLobe::Host(l) => l.f(wi) }
             }
             /// See [`Lobe::pdf`].
             #[inline]
             pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi), )* AnyLobe::Host(l) => l.pdf(wi) }
             }
             /// See [`Lobe::sample`].
             #[inline]
             pub fn sample(&self, u: [S; 2]) -> V3<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.sample(u) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.sample(u), )* AnyLobe::Host(l) => l.sample(u) }
             }
             /// See [`Lobe::albedo`].
             #[inline]
             pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve), )* AnyLobe::Host(l) => l.albedo(w) }
             }
             /// See [`Lobe::albedo_bound`].
             #[inline]
             pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
+            }
+            /// See [`Lobe::view_bound`].
+            pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+                match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::relative_eta`].
             #[inline]
             pub fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-                match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi) ),* }
+                match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
             }
             /// See [`Lobe::delta`].
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
-                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l) ),* }
+                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
             }
         }
     };
@@ -232,6 +286,7 @@ lobes! {
     sheen::Sheen,
     thread::Thread,
     microcylinder::Microcylinder,
+    microcylinder_threads::MicrocylinderThreads,
     velvet::Velvet,
     eon::Eon,
     microfacet::Microfacet,
@@ -246,6 +301,27 @@ impl LobeKind {
     /// Whether the lobe scatters, transmits in one direction, or emits.
     pub fn class(self) -> LobeClass {
         self.spec().class
+    }
+
+    /// Whether the lobe, at its defaults, sends light to the other side.
+    pub fn transmits(self) -> bool {
+        let mut values = Vec::new();
+        for p in self.spec().params {
+            if p.default.is_empty() {
+                values.extend([0.0; 3].iter().take(p.ty.slots()));
+            } else {
+                values.extend(p.default);
+            }
+        }
+        let (curve, wo) = (AlbedoCurve::default(), V3::polar(0.8, 0.0));
+        let lobe = AnyLobe::<f64>::new(self, &values, wo, &curve);
+        let below = |cos: f64| lobe.f(V3::polar(-cos, 0.4), &curve).iter().any(|f| *f > 0.0);
+        lobe.delta().is_some_and(|(wi, _)| wi.z < 0.0) || [0.1, 0.5, 0.9].into_iter().any(below)
+    }
+
+    /// Between what the albedo lies over ranges of parameters and of cosines: see [`Lobe::limits`].
+    pub fn limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Limits {
+        self.closed_limits(ranges, cos).unwrap_or_else(|| limits::of_table(self, ranges, cos))
     }
 
     /// The lobe called `name`.
@@ -271,5 +347,6 @@ const LAYER: Form = Form {
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    lobes.chain([LAYER]).chain(sheen::FORMS.iter().chain(microfacet::FORMS).chain(specular::FORMS).copied())
+    let lists = [sheen::FORMS, microfacet::FORMS, specular::FORMS];
+    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

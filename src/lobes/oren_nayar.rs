@@ -6,7 +6,8 @@
 //! The published form gains up to 1.5 % at grazing angles for sigma near 0.2 (E = A + B/2 there). Its albedo has the
 //! closed form used below, so the lobe is divided by max(1, E(ωo), E(ωi)), which keeps it reciprocal.
 
-use super::registry::closure;
+use super::limits::{Limits, SlotRange};
+use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Lift, Real, V3, sampling};
@@ -56,6 +57,33 @@ impl<S: Real> OrenNayar<S> {
 
 impl<S: Real> Lobe<S> for OrenNayar<S> {
     type Params = OrenNayarParams;
+
+    /// A falls and B rises with sigma; of the two parts of the sum the first falls with μ, the second is s(1 + s + s²)/
+    /// (1 + s), rising with s, times μ.
+    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        const PIECES: usize = 16;
+        let spec = &OrenNayarParams::SPEC.params[1];
+        let (lo, hi) = ranges.get(3).map_or((spec.min, spec.max), |r| (spec.clamp(0, r.0), spec.clamp(0, r.1)));
+        let at = |sigma: f32| {
+            OrenNayar::<f64>::new(
+                &OrenNayarParams { N: [0.0, 0.0, 1.0], sigma },
+                V3::new(0.0, 0.0, 1.0),
+                &AlbedoCurve::default(),
+            )
+        };
+        let (least, most) = (at(lo), at(hi));
+        let (from, to) = (cos.0.clamp(0.0, 1.0), cos.1.clamp(0.0, 1.0));
+        let sine = |c: f64| (1.0 - c * c).max(0.0).sqrt();
+        let mut highest = 0.0f64;
+        for k in 0..PIECES {
+            let node = |k: usize| from + (to - from) * k as f64 / PIECES as f64;
+            let (c, s) = (node(k + 1), sine(node(k)));
+            let near = s * (s.atan2(node(k)) - s * node(k));
+            let far = 2.0 / 3.0 * s * c * (1.0 + s + s * s) / (1.0 + s);
+            highest = highest.max(least.a + most.b * FRAC_1_PI * (near + far));
+        }
+        Some(Limits::above(cos, 0.0, highest.min(1.0)))
+    }
 
     fn new(params: &OrenNayarParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         let var = S::from_f32(params.sigma).sq();

@@ -71,6 +71,10 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
         Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(values[12], values[13]), facet }))
     }
 
+    fn tint_slot() -> Option<usize> {
+        SPEC.slot_of("reflection_tint")
+    }
+
     fn weight(params: &GeneralizedSchlickParams) -> [f32; 3] {
         params.reflection_tint
     }

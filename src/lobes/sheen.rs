@@ -336,6 +336,10 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         })
     }
 
+    fn tint_slot() -> Option<usize> {
+        SheenParams::SPEC.slot_of("albedo")
+    }
+
     fn weight(params: &SheenParams) -> [f32; 3] {
         params.albedo
     }
@@ -367,6 +371,10 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
+    }
+
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        [curve.view_bound(w, self.roughness); 3]
     }
 
     #[inline(always)]

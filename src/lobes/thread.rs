@@ -14,6 +14,7 @@
 //! range: darker near the thread's ends, but never gaining. Where f is divided, the albedo estimate is high.
 
 use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
+use super::limits::{self, Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
@@ -150,7 +151,25 @@ impl<S: Real> Lobe<S> for Thread<S> {
             // up to 0.3 %.
             margin: if axis.is_some() { 5e-3 } else { 0.0 },
             mirrored: true,
+            weave: None,
         }))
+    }
+
+    /// Linear in A and kd, with the largest albedo of each component.
+    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
+        let spec = ThreadParams::SPEC;
+        let clamped = |name: &str| {
+            let (slot, p) = (spec.slot_of(name)?, spec.params.iter().find(|p| p.name == name)?);
+            let range = |r: &SlotRange| (p.clamp(0, r.0), p.clamp(0, r.1));
+            let all = ranges.get(slot..slot + p.ty.slots())?.iter().map(range);
+            all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        };
+        let values: Vec<Option<f32>> = ranges.iter().map(|r| (r.0 == r.1).then_some(r.0)).collect();
+        let table = varying(&values).ok().and_then(|_| Self::table(&values))?;
+        let (a, kd) = (clamped("A")?.1 as f64, clamped("kd")?);
+        let [surface, forward, even] = limits::components(table);
+        let at = |kd: f32| surface + a * ((1.0 - kd as f64) * forward + kd as f64 * even);
+        Some(Limits::above(cos, 0.0, at(kd.0).max(at(kd.1)).min(1.0)))
     }
 
     fn new(params: &ThreadParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {

@@ -1,5 +1,6 @@
 //! Lambertian transmission.
 
+use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
@@ -25,6 +26,10 @@ pub struct Translucent<S> {
 
 impl<S: Real> Lobe<S> for Translucent<S> {
     type Params = TranslucentParams;
+
+    fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
+        Some(Limits { lowest: 1.0, highest: 1.0 })
+    }
 
     fn new(_: &TranslucentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         let zero = S::zero();

@@ -1,5 +1,6 @@
 //! Light that passes straight through.
 
+use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
@@ -21,6 +22,10 @@ pub struct Transparent<S> {
 
 impl<S: Real> Lobe<S> for Transparent<S> {
     type Params = TransparentParams;
+
+    fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
+        Some(Limits { lowest: 1.0, highest: 1.0 })
+    }
 
     fn new(_: &TransparentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
         Transparent { wo }

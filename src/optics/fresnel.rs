@@ -4,12 +4,18 @@ use super::Real;
 
 /// Reflectance of a dielectric surface at cosine `c`; `m` is η² − 1, η the far side's index over the near side's.
 /// Negative `m` is light leaving the denser side: beyond the critical angle all of it is reflected.
-///
-/// g − c is written as m/(g + c): the difference itself has no digits left for η near 1.
 #[inline(always)]
 pub fn dielectric<L: Real>(m: L, c: L) -> L {
     let c = c.clamp(L::zero(), L::one());
-    let g2 = c.mul_add(c, m);
+    dielectric_at(m, c, c.mul_add(c, m))
+}
+
+/// [`dielectric`] where g² = c² + m is known better than from c: next to the critical angle, where it is 0, the
+/// reflectance has a root's slope.
+///
+/// g − c is written as m/(g + c): the difference itself has no digits left for η near 1.
+#[inline(always)]
+pub fn dielectric_at<L: Real>(m: L, c: L, g2: L) -> L {
     let g = g2.safe_sqrt();
     let sum = (g + c).max(L::c(1e-12));
     let difference = m / sum;

@@ -64,6 +64,9 @@ impl Real for f64 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
+    fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
+        f(values)
+    }
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {
         self * a + o * b
@@ -89,6 +92,9 @@ impl Real for f32 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         // Not `f32::mul_add`: without the instruction it is a slow library call, and the lanes must agree bit for bit.
         self * a + b
+    }
+    fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
+        f(values.map(f64::from)).map(|x| x as f32)
     }
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {
@@ -255,6 +261,14 @@ impl Real for F32x8 {
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
+    }
+    fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
+        let mut out = [F32x8([0.0; 8]); 3];
+        for lane in 0..8 {
+            let [x, y, z] = f(values.map(|v| f64::from(v.0[lane])));
+            [out[0].0[lane], out[1].0[lane], out[2].0[lane]] = [x as f32, y as f32, z as f32];
+        }
+        out
     }
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {

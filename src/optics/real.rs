@@ -86,6 +86,8 @@ pub trait Real:
     }
     /// `table[index]` of a committed table; `index` holds whole numbers inside it.
     fn pick(table: &[f32], index: Self) -> Self;
+    /// Applies a function of doubles lane by lane: for formulas that come from outside.
+    fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3];
     /// x² .
     fn sq(self) -> Self {
         self * self

@@ -60,10 +60,7 @@ impl std::error::Error for OutputError {}
 /// Finds out before a long render whether [`save`] could write there. Leaves nothing behind.
 pub fn check(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
-    if path.is_dir() {
-        return Err(OutputError::new(path, "it is a directory"));
-    }
-    beside(path)?;
+    check_writable(path)?;
     Ok(format)
 }
 
@@ -76,9 +73,23 @@ pub fn save(image: &Image, path: &Path, exposure: f32) -> Result<(), OutputError
         Format::Exr => exr(image),
     }
     .map_err(|e| fail(&e))?;
+    replace(path, &bytes)
+}
+
+/// Finds out whether [`replace`] could write there. Leaves nothing behind.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    if path.is_dir() {
+        return Err(OutputError::new(path, "it is a directory"));
+    }
+    beside(path).map(drop)
+}
+
+/// Writes a file as a whole or not at all.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let fail = |e: &dyn fmt::Display| OutputError::new(path, e);
     let file = beside(path)?;
     let mut writer = BufWriter::new(file.as_file());
-    writer.write_all(&bytes).and_then(|()| writer.flush()).map_err(|e| fail(&e))?;
+    writer.write_all(bytes).and_then(|()| writer.flush()).map_err(|e| fail(&e))?;
     drop(writer);
     file.persist(path).map_err(|e| fail(&e.error))?;
     Ok(())

@@ -65,10 +65,46 @@ impl Plot<'_> {
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(2)));
         }
         if self.series.len() > 1 {
-            chart.configure_series_labels().background_style(WHITE.mix(0.85)).border_style(BLACK.mix(0.3)).draw()?;
+            chart
+                .configure_series_labels()
+                .position(self.quietest([x0, x1, y0, y1]))
+                .background_style(WHITE.mix(0.85))
+                .border_style(BLACK.mix(0.3))
+                .draw()?;
         }
         area.present()?;
         Ok(())
+    }
+
+    /// Where the legend hides least of the curves.
+    fn quietest(&self, [x0, x1, y0, y1]: [f64; 4]) -> SeriesLabelPosition {
+        use SeriesLabelPosition::{LowerLeft, LowerRight, MiddleRight, UpperLeft, UpperRight};
+        // Its size as a part of the picture's.
+        let (width, height) = (0.36, 0.04 + 0.055 * self.series.len() as f64);
+        let hidden = |left: f64, bottom: f64| {
+            let inside = |x: f64, y: f64| (left..left + width).contains(&x) && (bottom..bottom + height).contains(&y);
+            let mut count = 0;
+            for pair in self.series.iter().flat_map(|s| s.1.windows(2)) {
+                count += (0..=32)
+                    .filter(|k| {
+                        let t = f64::from(*k) / 32.0;
+                        let between = |a: f64, b: f64| a + (b - a) * t;
+                        let (x, y) = (between(pair[0].0, pair[1].0), between(pair[0].1, pair[1].1));
+                        inside((x - x0) / (x1 - x0), (y - y0) / (y1 - y0))
+                    })
+                    .count();
+            }
+            count
+        };
+        let (right, top) = (1.0 - width, 1.0 - height);
+        let places = [
+            (MiddleRight, hidden(right, 0.5 * top)),
+            (UpperRight, hidden(right, top)),
+            (LowerRight, hidden(right, 0.0)),
+            (UpperLeft, hidden(0.0, top)),
+            (LowerLeft, hidden(0.0, 0.0)),
+        ];
+        places.into_iter().min_by_key(|p| p.1).map_or(MiddleRight, |p| p.0)
     }
 }
 

@@ -3,22 +3,27 @@
 
 use overcoat::Globals;
 use overcoat::albedo::Precision;
-use overcoat::closure::{Bsdf, ClosureTree, Curves, Layering, NodeId, flatten};
+use overcoat::closure::{
+    Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, NodeId, Tables, flatten,
+};
 use overcoat::lobes::LobeKind;
 use overcoat::lobes::registry::{ParamSpec, ParamTy};
 use overcoat::optics::{Scalar, V3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 /// A tree with its tables, ready to be looked at from any direction.
 pub struct Stack<S: Scalar> {
     pub tree: ClosureTree,
     pub curves: Curves<S>,
     pub layering: Layering,
+    balance: Option<Balance<S>>,
 }
 
 impl<S: Scalar> Stack<S> {
     pub fn new(tree: ClosureTree, precision: Precision) -> Self {
         let curves = Curves::for_tree(&tree, precision);
-        Stack { tree, curves, layering: Layering::default() }
+        Stack { tree, curves, layering: Layering::default(), balance: None }
     }
 
     /// Bakes as for a script that does not know the parameters called `unknown` before it shades.
@@ -32,12 +37,21 @@ impl<S: Scalar> Stack<S> {
             }
             curves.set(site, kind.table(&known), precision);
         }
-        Stack { tree, curves, layering: Layering::default() }
+        Stack { tree, curves, layering: Layering::default(), balance: None }
+    }
+
+    /// Layers as told, with what `balanced` needs.
+    pub fn layered(&mut self, layering: Layering) {
+        let balanced = layering.rule == LayeringRule::Balanced;
+        let solve = || Balancer::with_nodes(32).solve(&self.tree, &Globals::default(), layering.tint, &self.curves);
+        self.balance = balanced.then(solve);
+        self.layering = layering;
     }
 
     pub fn bsdf(&self, wo: [S; 3]) -> Bsdf<'_, S> {
         let wo = V3::new(wo[0], wo[1], wo[2]);
-        flatten(&self.tree, &Globals::default(), wo, self.layering, &self.curves).expect("within budget")
+        let tables = Tables { curves: &self.curves, balance: self.balance.as_ref() };
+        flatten(&self.tree, &Globals::default(), wo, self.layering, tables).expect("within budget")
     }
 }
 
@@ -76,7 +90,7 @@ pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) ->
 }
 
 /// Blocks over a lobe's whole declared range: every parameter at its lower end, default, middle and upper end in turn,
-/// and all combinations for up to three parameters.
+/// and all combinations for up to three parameters; of more than eight, a few mixtures.
 pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     let free: Vec<&ParamSpec> = kind
         .spec()
@@ -84,11 +98,12 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         .iter()
         .filter(|p| !matches!(p.ty, ParamTy::Normal | ParamTy::Vector | ParamTy::Color))
         .collect();
+    let limit = if free.len() > 8 { 100.0 } else { 10.0 };
     let choices: Vec<Vec<f32>> = free
         .iter()
         .map(|p| {
             if p.ty == ParamTy::Float {
-                let (lo, hi) = (p.min.max(0.0), p.max.min(10.0));
+                let (lo, hi) = (p.min.max(0.0), p.max.min(limit));
                 vec![lo, lo + (hi - lo) * 0.1, lo + (hi - lo) * 0.4, hi]
             } else {
                 (p.min as i32..=p.max as i32).map(|v| v as f32).collect()
@@ -98,7 +113,13 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
     // Rough surfaces bake slowly, and their widths play alike parts.
     let thin = choices.len() > 3 || free.iter().any(|p| p.name == "distribution");
-    if thin {
+    if choices.len() > 8 {
+        // All at either end, and some mixtures.
+        let mut rng = Pcg64Mcg::seed_from_u64(1);
+        sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
+        sets.push(free.iter().map(|p| p.default[0]).collect());
+        sets.extend((0..5).map(|_| choices.iter().map(|c| c[rng.random_range(0..c.len())]).collect::<Vec<_>>()));
+    } else if thin {
         // One at a time, the others at their defaults; and all at either end.
         let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];

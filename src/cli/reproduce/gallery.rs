@@ -22,6 +22,12 @@ const STRIPS: &[(&str, &str, &str, &[&str])] = &[
         "Ci = 2 * microcylinder(N, dPdu, \"{}\");",
         &["linen", "silk_crepe", "satin", "shot_silk", "velvet"],
     ),
+    (
+        "microcylinder-offset",
+        "offset1",
+        "Ci = microcylinder(N, dPdu, color(0.5, 0.1, 0.1), 1.46, 0.2, 5, 10, 0.7, {}, color(0.3), 1.46, 0.5, 12, 24, 0.3, 0);",
+        &["0", "25", "60"],
+    ),
     ("eon", "roughness", "Ci = eon(N, color(0.6, 0.3, 0.2), {});", &["0", "0.5", "1"]),
     ("oren_nayar", "sigma", "Ci = color(0.6, 0.3, 0.2) * oren_nayar(N, {});", &["0", "0.4", "1.2"]),
 ];

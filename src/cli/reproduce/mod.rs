@@ -4,6 +4,7 @@
 mod fabric;
 mod fibre;
 mod gallery;
+mod layering;
 mod sheen;
 mod variance;
 
@@ -66,6 +67,7 @@ const FIGURES: &[(&str, Make)] = &[
     ("fabric-3-sampling", fabric::sampling),
     ("thread-reflectance", fibre::total_reflectance),
     ("cylinder-refraction", fibre::refraction),
+    ("layering", layering::losses),
     ("sampling-variance", variance::table),
     ("lobes", gallery::strips),
 ];
@@ -106,12 +108,12 @@ fn index(figures: &[(&str, Figure)]) -> String {
     page.push_str("Made by `overcoat reproduce DIR`. Pictures and the numbers behind them lie beside this page.\n");
     for (_, figure) in figures {
         let _ = write!(page, "\n## {}\n\n", figure.title);
-        for file in figure.files.iter().filter(|f| !f.ends_with(".csv")) {
+        for file in figure.files.iter().filter(|f| f.ends_with(".png") || f.ends_with(".svg")) {
             let _ = writeln!(page, "![{}]({file})\n", figure.title);
         }
         let _ = writeln!(page, "- The source: {}", figure.says);
         let _ = writeln!(page, "- Measured: {}", figure.measured);
-        for file in figure.files.iter().filter(|f| f.ends_with(".csv")) {
+        for file in figure.files.iter().filter(|f| f.ends_with(".csv") || f.ends_with(".md")) {
             let _ = writeln!(page, "- Numbers: [{file}]({file})");
         }
     }
@@ -179,6 +181,11 @@ impl Bench<'_> {
 
 /// A script of this command; its parameters are at their defaults.
 fn material(script: &str) -> Result<Material, Failure> {
+    engine_material(Engine::new(), script)
+}
+
+/// The same, by an engine of one's choice.
+fn engine_material(engine: Engine, script: &str) -> Result<Material, Failure> {
     let broken = |e: crate::engine::ScriptError| Failure::Script(e.to_string());
-    Engine::new().compile("figure", script).map_err(broken)?.material(&[]).map_err(broken)
+    engine.compile("figure", script).map_err(broken)?.material(&[]).map_err(broken)
 }

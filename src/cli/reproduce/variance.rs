@@ -19,6 +19,11 @@ const LOBES: &[(&str, &str, &[f64])] = &[
     ("velvet", "Ci = velvet(N, {});", &[0.1, 0.3, 1.0]),
     ("fabric", "Ci = fabric(N, dPdu, {});", &[0.0, 0.5, 1.0]),
     ("thread", "Ci = thread(N, dPdu, color(0.3), 1.46, 0.3, {}, 20);", &[5.0, 12.0, 30.0]),
+    (
+        "microcylinder, flat, gamma_v1",
+        "Ci = microcylinder(N, dPdu, color(0.3), 1.46, 0.3, 5, {}, 0.5, 0, color(0.3), 1.46, 0.3, 12, 24, 0.5, 0);",
+        &[5.0, 24.0],
+    ),
     ("microcylinder linen", "Ci = microcylinder(N, dPdu, \"linen\");", &[0.0]),
     ("microcylinder satin", "Ci = microcylinder(N, dPdu, \"satin\");", &[0.0]),
     ("microcylinder shot_silk", "Ci = microcylinder(N, dPdu, \"shot_silk\");", &[0.0]),

@@ -36,7 +36,7 @@ use crate::optics::{Scalar, V3};
 use scales::Scales;
 use solve::{probe_cosine, probes};
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why a lobe below a layer keeps the `min` rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,6 +67,17 @@ impl Unbalanced {
     }
 }
 
+/// What became of a lobe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fate {
+    /// No layer lies above it.
+    Uncovered,
+    /// Its scale was solved for.
+    Balanced,
+    /// It keeps `min`.
+    Min(Unbalanced),
+}
+
 /// Solved scales for the lobes of a tree or of a material.
 #[derive(Clone, Debug)]
 pub struct Balance<S> {
@@ -77,8 +88,8 @@ pub struct Balance<S> {
 
 #[derive(Clone, Debug)]
 enum Plan {
-    /// For a tree that is always the same: what became of each lobe, in the order they are met. `None`: no layer above.
-    Lobes(Vec<Option<Result<usize, Unbalanced>>>),
+    /// For a tree that is always the same: the scales of each lobe, in the order they are met.
+    Lobes(Vec<(LobeKind, Fate, Option<usize>)>),
     /// For trees that vary.
     Pairs(Vec<Pair>),
 }
@@ -99,11 +110,11 @@ impl<S: Scalar> Balance<S> {
         self.scales.iter().map(Scales::bytes).sum()
     }
 
-    /// For a tree that is the same everywhere: why each lobe below a layer keeps `min`, in the order they are met;
-    /// `None` for lobes that are balanced or have nothing above them. Empty for other materials.
-    pub fn unbalanced(&self) -> Vec<Option<Unbalanced>> {
+    /// For a tree that is the same everywhere: what became of each lobe, in the order they are met, tops first. Empty
+    /// for other materials.
+    pub fn fates(&self) -> Vec<(LobeKind, Fate)> {
         match &self.plan {
-            Plan::Lobes(lobes) => lobes.iter().map(|l| l.and_then(Result::err)).collect(),
+            Plan::Lobes(lobes) => lobes.iter().map(|l| (l.0, l.1)).collect(),
             Plan::Pairs(_) => vec![],
         }
     }
@@ -139,7 +150,7 @@ impl<S: Scalar> Balance<S> {
     ) -> Option<Balanced<'_, S>> {
         match &self.plan {
             Plan::Lobes(lobes) => {
-                let scales = &self.scales[(*lobes.get(met)?)?.ok()?];
+                let scales = &self.scales[lobes.get(met)?.2?];
                 Some(Balanced::new(scales, scales.row(S::zero(), S::zero()), cos_o))
             }
             Plan::Pairs(pairs) => {
@@ -175,8 +186,11 @@ type KernelKey = (LobeKind, u32, Vec<u32>);
 pub struct Balancer {
     nodes: usize,
     pair_nodes: usize,
-    kernels: HashMap<KernelKey, Option<Arc<Kernel>>>,
+    kernels: Mutex<HashMap<KernelKey, Option<Arc<Kernel>>>>,
 }
+
+/// Kernels kept at a time; a host that composes trees without end starts over.
+const MAX_KERNELS: usize = 2048;
 
 /// Rows over the weight of a top, and over a parameter of it that varies.
 const WEIGHTS: usize = 8;
@@ -185,13 +199,18 @@ const PARAMS: usize = 32;
 impl Balancer {
     /// Tables as fine as the precision asks for.
     pub fn new(precision: Precision) -> Self {
-        let nodes = precision.scale_nodes;
-        Balancer { nodes, pair_nodes: nodes.min(64), kernels: HashMap::new() }
+        Balancer::with_nodes(precision.scale_nodes)
+    }
+
+    /// Tables of `nodes` cosines (at least 8). Coarser ones lose more and gain no more.
+    pub fn with_nodes(nodes: usize) -> Self {
+        let nodes = nodes.max(8);
+        Balancer { nodes, pair_nodes: nodes.min(64), kernels: Mutex::default() }
     }
 
     /// Scales for `tree`, wherever it is shaded with normals and tangents that are equal where those of `globals` are.
     pub fn solve<S: Scalar>(
-        &mut self,
+        &self,
         tree: &ClosureTree,
         globals: &Globals,
         tint: TintRule,
@@ -211,10 +230,11 @@ impl Balancer {
             })
             .collect();
         let mut balance = Balance { scales: vec![], plan: Plan::Lobes(vec![]), tint };
-        let found = lobes.into_iter().enumerate().map(|(met, kernel)| {
-            let kernel = match kernel? {
-                Ok(kernel) => kernel,
-                Err(why) => return Some(Err(why)),
+        let found = lobes.into_iter().enumerate().map(|(met, (kind, kernel))| {
+            let kernel = match kernel {
+                None => return (kind, Fate::Uncovered, None),
+                Some(Err(why)) => return (kind, Fate::Min(why), None),
+                Some(Ok(kernel)) => kernel,
             };
             let alpha = |c: usize| alphas.iter().map(|a| a[met][c]).collect::<Vec<f64>>();
             let colors = [alpha(0), alpha(1), alpha(2)];
@@ -224,7 +244,7 @@ impl Balancer {
             let values = solved.map(S::c).collect();
             let (lo, inv_range) = (S::zero(), S::zero());
             balance.scales.push(Scales { values, nodes, weights: 1, params: 1, channels, lo, inv_range });
-            Some(Ok(balance.scales.len() - 1))
+            (kind, Fate::Balanced, Some(balance.scales.len() - 1))
         });
         let found = found.collect();
         Balance { plan: Plan::Lobes(found), ..balance }
@@ -233,7 +253,7 @@ impl Balancer {
     /// Scales for a material whose trees vary: for each of `pairs` (sites of top and base) whose top is a lobe without
     /// unknowns but its weight and one parameter, and whose base has none but its weight.
     pub fn solve_pairs<S: Scalar>(
-        &mut self,
+        &self,
         sites: &[Construction<'_>],
         pairs: &[(u32, u32)],
         tint: TintRule,
@@ -253,7 +273,7 @@ impl Balancer {
     }
 
     fn solve_pair<S: Scalar>(
-        &mut self,
+        &self,
         sites: &[Construction<'_>],
         top: u32,
         base: u32,
@@ -299,7 +319,7 @@ impl Balancer {
 
     /// The kernel of a lobe, or why it cannot be balanced.
     fn kernel<S: Scalar>(
-        &mut self,
+        &self,
         kind: LobeKind,
         site: u32,
         values: &[f32],
@@ -315,15 +335,32 @@ impl Balancer {
         if !kind.reciprocal(values) {
             return Err(Unbalanced::NotReciprocal);
         }
-        let mut bits: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
-        // The normal turns the frame and leaves f as it is.
-        if let Some(n) = kind.spec().normal_slot() {
-            bits[n..n + 3].fill(0);
+        // Normals turn the frame, and colors that only weigh the lobe leave its means as they are.
+        let mut plain = values.to_vec();
+        let mut at = 0;
+        for p in kind.spec().params {
+            if p.ty == ParamTy::Normal || (p.ty == ParamTy::Color && is_weight(kind, at)) {
+                plain[at..at + p.ty.slots()].fill(1.0);
+            }
+            at += p.ty.slots();
         }
-        bits.push(nodes as u32);
-        let found = self.kernels.entry((kind, site, bits));
-        let kernel = found.or_insert_with(|| Kernel::new(kind, values, curves.of(site), nodes).map(Arc::new));
-        kernel.clone().ok_or(Unbalanced::Crosses)
+        let bits = plain.iter().map(|v| v.to_bits()).chain([nodes as u32]).collect();
+        let key: KernelKey = (kind, site, bits);
+        let known = self.known().get(&key).cloned();
+        let kernel = known.unwrap_or_else(|| {
+            let kernel = Kernel::new(kind, &plain, curves.of(site), nodes).map(Arc::new);
+            let mut kernels = self.known();
+            if kernels.len() >= MAX_KERNELS {
+                kernels.clear();
+            }
+            kernels.insert(key, kernel.clone());
+            kernel
+        });
+        kernel.ok_or(Unbalanced::Crosses)
+    }
+
+    fn known(&self) -> MutexGuard<'_, HashMap<KernelKey, Option<Arc<Kernel>>>> {
+        self.kernels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -369,13 +406,16 @@ fn is_weight(kind: LobeKind, slot: usize) -> bool {
     kind.weight(&values) == probe
 }
 
+/// The kernel of a lobe, or why it is not balanced; `None` where no layer lies above.
+type Planned = Option<Result<Arc<Kernel>, Unbalanced>>;
+
 /// Finds out which lobes can be balanced.
 struct Planner<'a, S: Scalar> {
     globals: &'a Globals,
     curves: &'a Curves<S>,
     chain: Chain<S>,
-    lobes: Vec<Option<Result<Arc<Kernel>, Unbalanced>>>,
-    balancer: &'a mut Balancer,
+    lobes: Vec<(LobeKind, Planned)>,
+    balancer: &'a Balancer,
 }
 
 impl<S: Scalar> Visitor<S> for Planner<'_, S> {
@@ -394,7 +434,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
         let LobeVisit { kind, site, values, .. } = visit;
         if kind.class() == LobeClass::Emission {
-            self.lobes.push(None);
+            self.lobes.push((kind, None));
             return;
         }
         let normal = walk::frame(walk::directions(kind, values, self.globals), self.globals).n;
@@ -402,7 +442,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
             self.chain.fits(normal)?;
             self.balancer.kernel(kind, site, values, self.curves, self.balancer.nodes)
         });
-        self.lobes.push(fate);
+        self.lobes.push((kind, fate));
         self.chain.lobe(&visit, normal, S::zero());
     }
 }

@@ -11,8 +11,8 @@ use crate::span::Span;
 use crate::syntax::ast::{self, Sym};
 use std::sync::OnceLock;
 
-/// Every way to call a closure.
-fn forms() -> &'static [Form] {
+/// Every way to call a built-in closure.
+fn built_in() -> &'static [Form] {
     static FORMS: OnceLock<Vec<Form>> = OnceLock::new();
     FORMS.get_or_init(|| lobes::forms().collect())
 }
@@ -23,9 +23,14 @@ struct Given {
     typed: Vec<Typed>,
 }
 
-impl Checker<'_> {
+impl<'a> Checker<'a> {
     pub(super) fn is_function(&self, name: &str) -> bool {
-        !builtins::overloads(name).is_empty() || forms().iter().any(|f| f.name == name)
+        !builtins::overloads(name).is_empty() || self.forms().any(|f| f.name == name)
+    }
+
+    /// Every way to call a closure.
+    fn forms(&self) -> impl Iterator<Item = &'a Form> + use<'a> {
+        built_in().iter().chain(self.hosts)
     }
 
     pub(super) fn call(&mut self, name: Sym, at: Span, args: ast::Args, span: Span) -> Typed {
@@ -33,7 +38,7 @@ impl Checker<'_> {
         let typed = ids.iter().map(|id| self.of(*id)).collect();
         let given = Given { ids, typed };
         let text = self.ast.name(name);
-        let candidates: Vec<&'static Form> = forms().iter().filter(|f| f.name == text).collect();
+        let candidates: Vec<&'a Form> = self.forms().filter(|f| f.name == text).collect();
         if let Some(found) = self.builtin(text, &given, span) {
             return found;
         }
@@ -62,8 +67,20 @@ impl Checker<'_> {
         if given.typed.iter().any(|arg| arg.ty == Ty::Poison) {
             return Some(self.poison());
         }
-        let converted: Vec<ExprId> =
+        let mut converted: Vec<ExprId> =
             given.typed.iter().zip(params).map(|(arg, param)| self.convert(*arg, param, span)).collect();
+        for (at, value) in converted.iter_mut().enumerate() {
+            if let Some(options) = BUILTINS[index as usize].options(at) {
+                let span = self.span_of(given.ids[at]);
+                if let ast::ExprKind::String(sym) = self.ast.expr(given.ids[at]).kind
+                    && !options.contains(&self.ast.name(sym))
+                {
+                    let d = super::super::passes::needs::unknown_option(self.ast.name(sym), options, span);
+                    return Some(self.error(d));
+                }
+                *value = self.push(ExprKind::OptionIndex(options, *value), Ty::Float, span).id;
+            }
+        }
         Some(match BUILTINS[index as usize].eval {
             Eval::Global(g) => self.push(ExprKind::Global(g), ty, span),
             Eval::MixClosures => self.mix(converted[0], converted[1], converted[2], span),
@@ -231,7 +248,7 @@ impl Checker<'_> {
     }
 
     /// Explains why a call fits nothing.
-    fn no_match(&mut self, name: &str, at: Span, given: &Given, forms: &[&'static Form], span: Span) -> Typed {
+    fn no_match(&mut self, name: &str, at: Span, given: &Given, forms: &[&Form], span: Span) -> Typed {
         let overloads = builtins::overloads(name);
         if overloads.is_empty() && forms.is_empty() {
             return self.unknown_function(name, at);
@@ -273,7 +290,7 @@ impl Checker<'_> {
             return self.error(Diagnostic::error("E0109", at, format!("`{name}()` is not supported")));
         }
         let d = Diagnostic::error("E0206", at, format!("unknown function `{name}`"));
-        let names = forms().iter().map(|f| f.name).chain(BUILTINS.iter().map(|b| b.name));
+        let names = self.forms().map(|f| f.name).chain(BUILTINS.iter().map(|b| b.name));
         let like = suggest(name, names).map(|like| format!("did you mean `{like}`?"));
         self.error(like.into_iter().fold(d, Diagnostic::help))
     }

@@ -1,7 +1,7 @@
 //! Checking of single expressions: names, operators, conversions, assignments.
 
 use super::super::body::{Args, ExprId, ExprKind, GlobalVar, Op, VarId};
-use super::super::builtins::CONSTANTS;
+use super::super::builtins::{BUILTINS, CONSTANTS};
 use super::super::types::Ty;
 use super::{Access, Checker, Typed, suggest};
 use crate::diag::Diagnostic;
@@ -327,7 +327,13 @@ impl Checker<'_> {
                 let float = self.op(Op::IntToFloat, &[a.id], Ty::Float, span);
                 self.op(Op::Splat, &[float.id], to, span).id
             }
-            (Ty::Float, to) if to.is_triple() => self.op(Op::Splat, &[a.id], to, span).id,
+            (Ty::Float, to) if to.is_triple() => match self.body.expr(a.id).kind {
+                // Three numbers where three are asked for, rather than one three times.
+                ExprKind::Call(index, _) if BUILTINS[index as usize].result_follows_use() => {
+                    self.push(self.body.expr(a.id).kind, to, span).id
+                }
+                _ => self.op(Op::Splat, &[a.id], to, span).id,
+            },
             _ => a.id,
         }
     }

@@ -13,14 +13,15 @@ use super::passes::fold;
 use super::shader::{CheckedShader, ParamDecl, Value};
 use super::types::Ty;
 use crate::diag::Diagnostic;
+use crate::lobes::registry::Form;
 use crate::span::Span;
 use crate::syntax::ast::{self, Ast, Sym};
 use std::collections::HashMap;
 pub(super) use suggest::suggest;
 
 /// Checks a parsed script. Ok: the shader and its warnings.
-pub fn check(name: &str, ast: &Ast) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let mut checker = Checker::new(ast);
+pub fn check(name: &str, ast: &Ast, hosts: &[Form]) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let mut checker = Checker::new(ast, hosts);
     let shader = checker.shader(name);
     let (errors, warnings): (Vec<_>, Vec<_>) = checker.diagnostics.into_iter().partition(Diagnostic::is_error);
     match shader {
@@ -53,6 +54,8 @@ struct Variable {
 
 struct Checker<'a> {
     ast: &'a Ast,
+    /// Closures of the host.
+    hosts: &'a [Form],
     body: Body,
     diagnostics: Vec<Diagnostic>,
     /// The meaning of each syntax expression of the run at hand.
@@ -72,11 +75,12 @@ struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    fn new(ast: &'a Ast) -> Self {
+    fn new(ast: &'a Ast, hosts: &'a [Form]) -> Self {
         let body = Body { vars: vec![Ty::Closure], strings: vec![String::new()], ..Body::default() };
         let variables = vec![Variable { access: Access::Free, span: Span::default(), depth: 0 }];
         Checker {
             ast,
+            hosts,
             body,
             diagnostics: Vec::new(),
             typed: Vec::new(),

@@ -3,6 +3,7 @@
 pub mod dead;
 mod env;
 pub mod fold;
+pub mod layers;
 pub mod needs;
 
 use super::body::{Body, ExprId, ExprKind, Root};

@@ -1,0 +1,4 @@
+//! The longer functions of the table, by subject.
+
+pub mod color;
+pub mod noise;
