@@ -37,12 +37,6 @@ fn a_white_surface_stays_white() {
             let set = [("distribution", shape), ("xalpha", alpha.0), ("yalpha", alpha.1), ("eta", 0.0)];
             let stack = single::<f64>(LobeKind::Microfacet, &set);
             for cos in COSINES {
-                // The furnace misses part of a narrow Gaussian peak; samples find all of it.
-                if shape > 0.0 && alpha.0 < 0.1 {
-                    let e = sampled(&stack, cos);
-                    assert!((0.98..1.01).contains(&e), "{shape} {alpha:?} cos {cos}: samples carry {e}");
-                    continue;
-                }
                 for side in [Side::View, Side::Light] {
                     let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
                     worst = (worst.0.min(e.max()), worst.1.max(e.max()));
@@ -57,14 +51,15 @@ fn a_white_surface_stays_white() {
 #[test]
 fn glass_divides_all_light_between_reflection_and_refraction() {
     let mut worst = (1.0f64, 1.0f64);
-    for (alpha, ior) in [(1e-4, 1.5), (0.05, 1.5), (0.3, 1.33), (0.3, 2.4), (1.0, 1.5)] {
-        let set = [("roughness_x", alpha), ("roughness_y", alpha), ("ior", ior)];
+    let surfaces = [(1e-4, 1.5), (0.05, 1.5), (0.3, 1.33), (0.3, 2.4), (1.0, 1.5), (0.5, 0.7), (0.3, 0.5)];
+    for (k, (alpha, ior)) in surfaces.into_iter().enumerate() {
+        let set = [("roughness_x", alpha), ("roughness_y", alpha), ("ior", ior), ("distribution", (k % 2) as f32)];
         let stack = single::<f64>(LobeKind::Dielectric, &set);
         for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
             for side in [Side::View, Side::Light] {
                 let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
                 worst = (worst.0.min(e.max()), worst.1.max(e.max()));
-                assert!((e.max() - 1.0).abs() < 1e-3, "α {alpha} ior {ior} {side:?} cos {cos}: {e:?}");
+                assert!((0.999..1.0001).contains(&e.max()), "α {alpha} ior {ior} {side:?} cos {cos}: {e:?}");
             }
         }
     }

@@ -287,14 +287,20 @@ impl FacetSpec {
             Facet::Mirror { parts, .. } => (1, if self.alpha.is_some() { parts } else { 0 }),
             Facet::Dielectric { .. } => (2, if self.alpha.is_some() { 2 } else { 0 }),
         };
-        let grid = Grid { spec: self, rule: FacetQuadrature::new(precision, self.facet), rows, nodes };
+        let grid = Grid {
+            spec: self,
+            rule: FacetQuadrature::new(precision, true),
+            probe: FacetQuadrature::new(precision, false),
+            rows,
+            nodes,
+        };
         let plane = rows * nodes;
         let places: Vec<usize> = (0..sheets * plane).collect();
         let albedos = parallel(&places, |&k| grid.albedos(k / plane, (k % plane / nodes) as f64, (k % nodes) as f64));
-        let parts_of = |part: usize| albedos.iter().map(move |a| S::c(a[part + 1]));
+        let parts_of = |part: usize| albedos.iter().map(move |a| S::c(a[part + 1].0));
         let view: Vec<S> = (0..parts).flat_map(parts_of).collect();
         let mut tables = FacetTables {
-            missing: albedos.iter().map(|a| S::c((1.0 - a[0]).max(0.0))).collect(),
+            missing: albedos.iter().map(|a| S::c((1.0 - a[0].0).max(0.0))).collect(),
             bound: view.clone(),
             view,
             means: vec![],
@@ -309,10 +315,11 @@ impl FacetSpec {
             let missing = tables.missing[k].to_f64();
             // Not quite 0, so that between nodes single precision keeps its digits.
             let floor = (0.1 * missing).min(2e-5);
-            tables.missing[k] = S::c((missing - lift[0] - precision.margin).max(floor));
+            let margin = |part: usize| lift[part] + precision.margin + albedos[k][part].1;
+            tables.missing[k] = S::c((missing - margin(0)).max(floor));
             for part in 0..parts {
                 let bound = &mut tables.bound[part * sheets * plane + k];
-                *bound = S::c(bound.to_f64() + lift[part + 1] + precision.margin);
+                *bound = S::c(bound.to_f64() + margin(part + 1));
             }
         }
         tables.means = grid.means(&tables);
@@ -324,6 +331,7 @@ impl FacetSpec {
 struct Grid<'s> {
     spec: &'s FacetSpec,
     rule: FacetQuadrature,
+    probe: FacetQuadrature,
     rows: usize,
     nodes: usize,
 }
@@ -346,7 +354,7 @@ impl Grid<'_> {
         (V3::new(sin * azimuth.cos(), sin * azimuth.sin(), if sheet == 0 { cos } else { -cos }), alpha)
     }
 
-    fn albedos(&self, sheet: usize, row: f64, node: f64) -> [f64; PARTS + 1] {
+    fn albedos(&self, sheet: usize, row: f64, node: f64) -> [(f64, f64); PARTS + 1] {
         let (w, alpha) = self.at(sheet, row, node);
         self.rule.albedos(self.spec, alpha, w)
     }
@@ -366,12 +374,12 @@ impl Grid<'_> {
         }
         let missed = parallel(&probes, |&(sheet, row, node)| {
             let (w, alpha) = self.at(sheet, row, node);
-            let truth = self.rule.albedos(self.spec, alpha, w);
+            let truth = self.probe.albedos(self.spec, alpha, w);
             let (w, alpha) = (w.map(S::c), alpha.map(S::c));
             let read = tables.view(w);
-            let mut missed = [truth[0] - (1.0 - tables.missing(w, alpha).to_f64()); PARTS + 1];
+            let mut missed = [truth[0].0 - (1.0 - tables.missing(w, alpha).to_f64()); PARTS + 1];
             for part in 0..tables.parts {
-                missed[part + 1] = truth[part + 1] - read[part].to_f64();
+                missed[part + 1] = truth[part + 1].0 - read[part].to_f64();
             }
             missed
         });
@@ -421,26 +429,27 @@ impl Grid<'_> {
     }
 }
 
-/// A rule over visible facets.
+/// A rule over visible facets, and perhaps a coarser one to judge it by: along lines, and around.
 pub struct FacetQuadrature {
-    along: Rule,
-    around: Rule,
+    fine: [Rule; 2],
+    coarse: Option<[Rule; 2]>,
 }
 
 /// Where along a line the kind of facet is looked at.
 const STEPS: usize = 16;
 
 impl FacetQuadrature {
-    /// As fine as a precision asks for, for one kind of facet.
-    pub fn new(precision: Precision, facet: Facet) -> Self {
-        // Total reflection puts more edges into the integrand.
-        let more = if matches!(facet, Facet::Dielectric { .. }) { 2 } else { 1 };
-        let along = Rule::gauss_legendre((precision.polar / 2).max(12));
-        FacetQuadrature { along, around: Rule::gauss_legendre(more * precision.azimuth) }
+    /// As fine as a precision asks for; unless `judged` it does not say how far off it may be.
+    pub fn new(precision: Precision, judged: bool) -> Self {
+        let [along, around] = [precision.polar / 2 + 4, precision.azimuth];
+        FacetQuadrature {
+            fine: [along, around].map(Rule::gauss_legendre),
+            coarse: judged.then(|| [along, around].map(|n| Rule::gauss_legendre(n * 2 / 3))),
+        }
     }
 
-    /// E and its parts at `w`, whose z may be negative for a dielectric.
-    pub fn albedos(&self, spec: &FacetSpec, alpha: [f64; 2], w: V3<f64>) -> [f64; PARTS + 1] {
+    /// E and its parts at `w`, whose z may be negative for a dielectric; and how far off they may be.
+    pub fn albedos(&self, spec: &FacetSpec, alpha: [f64; 2], w: V3<f64>) -> [(f64, f64); PARTS + 1] {
         let facets = Facets::new(spec.shape, alpha);
         let wo = V3::new(w.x, w.y, w.z.abs());
         let facet = match spec.facet {
@@ -448,56 +457,77 @@ impl FacetQuadrature {
             facet => facet,
         };
         let seen = Seen { facets: &facets, facet, wo, reach: facets.reach(wo), proposal: facets.proposal().reach(wo) };
-        // About the azimuth of ωo as the stretched surface sees it, graded toward its far end, where at grazing angles
-        // facets seen edge-on meet. Half the circle will do where the other half is its mirror image.
+        // About the azimuth of ωo as the stretched surface sees it. Half the circle will do where the other half is its
+        // mirror image.
         let start = (wo.y * alpha[1]).atan2(wo.x * alpha[0]);
         let turns: &[f64] = if alpha[0] == alpha[1] { &[1.0] } else { &[1.0, -1.0] };
-        let halves = turns.iter().flat_map(|turn| {
-            let nodes = self.around.nodes.iter().zip(&self.around.weights);
-            nodes.map(move |(v, weight)| (start + turn * PI * (1.0 - v * v), weight * 2.0 * v / turns.len() as f64))
-        });
-        let mut sums = [0.0; PARTS + 1];
-        for (phi, share) in halves {
-            let u0 = phi / TAU;
-            let line = |u1: f64| facets.visible(wo, [u0, u1]);
-            let mut from = 0.0;
-            for edge in self.edges(&seen, line) {
-                for (t, weight) in self.along.nodes.iter().zip(&self.along.weights) {
-                    // Graded toward the edges, where a square root may begin.
-                    let u1 = from + (edge - from) * t * t * (3.0 - 2.0 * t);
-                    let weight = weight * (edge - from) * 6.0 * t * (1.0 - t) * share;
-                    let values = seen.values(line(u1));
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        *sum += weight * value;
-                    }
-                }
-                from = edge;
+        let mut sums = [(0.0, 0.0); PARTS + 1];
+        for turn in turns {
+            let halves = self.half(&seen, |v| (start + turn * PI * (1.0 - v * v)) / TAU);
+            for (sum, [fine, coarse]) in sums.iter_mut().zip(halves) {
+                let share = 1.0 / turns.len() as f64;
+                // The finer rule is at least this much better.
+                let off = if self.coarse.is_some() { 0.25 * (fine - coarse).abs() } else { 0.0 };
+                *sum = (sum.0 + share * fine, sum.1 + share * off);
             }
         }
         sums
     }
 
-    /// The ends of the pieces of [0, 1] on which all facets are of one kind.
-    fn edges(&self, seen: &Seen<'_>, line: impl Fn(f64) -> V3<f64>) -> Vec<f64> {
-        let kind = |u: f64| seen.kind(line(u));
-        let mut edges = Vec::new();
-        let (mut last, mut last_kind) = (0.0, kind(0.0));
-        for k in 1..=STEPS {
-            let next = k as f64 / STEPS as f64;
-            let next_kind = kind(next);
-            if next_kind != last_kind {
-                let (mut lo, mut hi) = (last, next);
-                for _ in 0..14 {
-                    let middle = 0.5 * (lo + hi);
-                    if kind(middle) == last_kind { lo = middle } else { hi = middle }
+    /// The mean over half the azimuths, by either rule; `azimuth` is graded toward the far end, where at grazing angles
+    /// facets seen edge-on meet.
+    fn half(&self, seen: &Seen<'_>, azimuth: impl Fn(f64) -> f64) -> [[f64; 2]; PARTS + 1] {
+        let line = |v: f64| {
+            let u0 = azimuth(v);
+            move |u1: f64| seen.facets.visible(seen.wo, [u0, u1])
+        };
+        let kinds =
+            |v: f64| changes(|u| seen.kind(line(v)(u)), STEPS).into_iter().map(|piece| piece.1).collect::<Vec<_>>();
+        let ends = changes(kinds, 2 * STEPS);
+        let mut sums = [[0.0; 2]; PARTS + 1];
+        for (rule, [along, around]) in [&self.fine].into_iter().chain(&self.coarse).enumerate() {
+            let mut from = 0.0;
+            for (to, _) in &ends {
+                for (v, share) in around.between(from, *to) {
+                    let line = line(v);
+                    let mut low = 0.0;
+                    for (edge, _) in changes(|u| seen.kind(line(u)), STEPS) {
+                        for (u1, weight) in along.between(low, edge) {
+                            let values = seen.values(line(u1));
+                            for (sum, value) in sums.iter_mut().zip(values) {
+                                sum[rule] += weight * share * 2.0 * v * value;
+                            }
+                        }
+                        low = edge;
+                    }
                 }
-                edges.push(hi);
+                from = *to;
             }
-            (last, last_kind) = (next, next_kind);
         }
-        edges.push(1.0);
-        edges
+        sums
     }
+}
+
+/// The pieces of [0, 1] on which a value stays the same, as far as steps of 1/`steps` show it: their ends, and the value.
+fn changes<T: PartialEq>(of: impl Fn(f64) -> T, steps: usize) -> Vec<(f64, T)> {
+    let mut pieces = Vec::new();
+    let (mut last, mut value) = (0.0, of(0.0));
+    for k in 1..=steps {
+        let next = k as f64 / steps as f64;
+        // A step may hold several changes.
+        while of(next) != value {
+            let (mut lo, mut hi) = (last, next);
+            for _ in 0..14 {
+                let middle = 0.5 * (lo + hi);
+                if of(middle) == value { lo = middle } else { hi = middle }
+            }
+            pieces.push((hi, std::mem::replace(&mut value, of(hi))));
+            last = hi;
+        }
+        last = next;
+    }
+    pieces.push((1.0, value));
+    pieces
 }
 
 /// A surface seen from one direction.

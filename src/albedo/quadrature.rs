@@ -35,6 +35,15 @@ impl Rule {
         }
         Rule { nodes, weights }
     }
+
+    /// Nodes and weights on `[from, to]`, graded toward both ends, where an integrand may begin like a root.
+    pub fn between(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+        let length = to - from;
+        self.nodes
+            .iter()
+            .zip(&self.weights)
+            .map(move |(t, weight)| (from + length * t * t * (3.0 - 2.0 * t), weight * length * 6.0 * t * (1.0 - t)))
+    }
 }
 
 /// Pₙ(x) and its derivative, by the three-term recurrence.

@@ -92,11 +92,26 @@ pub fn integrate_until(
     }
 }
 
+/// No cell is cut narrower.
+const NARROWEST: f64 = 1e-10;
+
 /// Splits `cells` until none holds more than `most` of the `points` (where a peak too narrow to be found was sampled).
 pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f64; 4]> {
-    let inside = |c: &[f64; 4], p: &[f64; 2]| (c[0]..c[1]).contains(&p[0]) && (c[2]..c[3]).contains(&p[1]);
-    let mut open: Vec<([f64; 4], Vec<[f64; 2]>)> =
-        cells.iter().map(|c| (*c, points.iter().copied().filter(|p| inside(c, p)).collect())).collect();
+    // A peak at an edge lies on both sides of it, wherever its points fell: those close by count in both.
+    let fold = |x: f64, lo: f64, hi: f64| {
+        let folded = if x < lo {
+            2.0 * lo - x
+        } else if x >= hi {
+            2.0 * hi - x
+        } else {
+            x
+        };
+        ((lo..hi).contains(&x) || (folded - x).abs() < 0.02 * (hi - lo)).then_some(folded)
+    };
+    let of = |c: &[f64; 4]| -> Vec<[f64; 2]> {
+        points.iter().filter_map(|p| Some([fold(p[0], c[0], c[1])?, fold(p[1], c[2], c[3])?])).collect()
+    };
+    let mut open: Vec<([f64; 4], Vec<[f64; 2]>)> = cells.iter().map(|c| (*c, of(c))).collect();
     let mut done = Vec::new();
     while let Some((cell, mut points)) = open.pop() {
         let ends = |axis: usize| {
@@ -109,7 +124,7 @@ pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f6
         let (lo, hi) = (cell[2 * axis], cell[2 * axis + 1]);
         let (first, last) = ends(axis);
         // A little at a time, so that the flanks of the peak get cells of their own.
-        let reach = (last - first).max(0.125 * (hi - lo));
+        let reach = (last - first).max(0.125 * (hi - lo)).max(NARROWEST);
         let at = if points.len() < 2 {
             None
         } else if first - lo > 2.0 * reach {
@@ -120,7 +135,7 @@ pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f6
         } else {
             points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
             let middle = points[points.len() / 2][axis];
-            (points.len() > most && middle > lo).then_some(middle)
+            (points.len() > most && middle > lo + NARROWEST && middle < hi - NARROWEST).then_some(middle)
         };
         let Some(at) = at else {
             done.push(cell);

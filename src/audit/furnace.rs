@@ -116,7 +116,7 @@ fn hints<S: Scalar>(held: &Bsdf<'_, S>) -> Vec<[S; 3]> {
         let u = [0.819_172_5, 0.671_043_6, 0.549_700_5].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
         held.sample(u).filter(|s| !s.flags.delta).map(|s| s.wi)
     };
-    (0..64).filter_map(sample).collect()
+    (0..256).filter_map(sample).collect()
 }
 
 /// Lobes that are integrated together, because their edges and ridges lie alike.
@@ -220,7 +220,7 @@ impl<S: Scalar> Chart<S> {
     /// [`cells`](Self::cells), split among directions where light is known to go.
     fn cells_at(&self, hints: &[[S; 3]]) -> Vec<[f64; 4]> {
         let points: Vec<[f64; 2]> = hints.iter().map(|w| self.place(*w)).collect();
-        split_at(&self.cells(), &points, 8)
+        split_at(&self.cells(), &points, 16)
     }
 
     /// Where a direction in world space lies in the chart.

@@ -62,7 +62,7 @@ impl<S: Real> Lobe<S> for Conductor<S> {
             None => false,
         });
         let facet = Facet::Mirror { reflectance, key, parts: if known { 3 } else { 0 } };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(values[6], values[7]), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 2, 6, values), facet }))
     }
 
     fn follows_tangent(params: &ConductorParams) -> bool {

@@ -55,7 +55,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[7].clamp(0, values[15]?) as usize];
         let facet = Facet::Dielectric { eta: index(SPEC.params[6].clamp(0, values[14]?)) };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(values[12], values[13]), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 4, 12, values), facet }))
     }
 
     fn follows_tangent(params: &DielectricParams) -> bool {

@@ -101,7 +101,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         } else {
             Facet::Mirror { reflectance: white, key: [0.0; 8], parts: 0 }
         };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(values[7], values[8]), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 3, 7, values), facet }))
     }
 
     fn follows_tangent(params: &MicrofacetParams) -> bool {

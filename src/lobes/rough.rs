@@ -7,6 +7,7 @@
 //! is known of E, M is 0 and the light is lost.
 
 use super::Rgb;
+use super::registry::LobeSpec;
 use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
@@ -22,9 +23,10 @@ pub(super) fn widths(alpha: [f32; 2]) -> [f32; 2] {
     alpha.map(|a| a.max(floor))
 }
 
-/// The widths of a table, if both are known.
-pub(super) fn known_widths(x: Option<f32>, y: Option<f32>) -> Option<[f64; 2]> {
-    Some(widths([x?, y?]).map(f64::from))
+/// The widths of a table, if both are known: the parameter `first`, which begins at `slot`, and the one after it.
+pub(super) fn known_widths(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f64; 2]> {
+    let value = |k: usize| Some(spec.params[first + k].clamp(0, values[slot + k]?));
+    Some(widths([value(0)?, value(1)?]).map(f64::from))
 }
 
 /// What a facet reflects.

@@ -68,7 +68,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
             None => false,
         });
         let facet = Facet::Mirror { reflectance, key, parts: if known { 3 } else { 0 } };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(values[12], values[13]), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 4, 12, values), facet }))
     }
 
     fn tint_slot() -> Option<usize> {

@@ -90,7 +90,7 @@ pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) ->
 }
 
 /// Blocks over a lobe's whole declared range: every parameter at its lower end, default, middle and upper end in turn,
-/// and all combinations for up to three parameters; of more than eight, a few mixtures.
+/// and all combinations for up to three parameters; of more than eight, a few mixtures. Rough surfaces: [`surfaces`].
 pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     let free: Vec<&ParamSpec> = kind
         .spec()
@@ -111,8 +111,10 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
         })
         .collect();
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
-    // Rough surfaces bake slowly, and their widths play alike parts.
-    let thin = choices.len() > 3 || free.iter().any(|p| p.name == "distribution");
+    let thin = choices.len() > 3;
+    if free.iter().any(|p| p.name == "distribution") {
+        return surfaces(kind);
+    }
     if choices.len() > 8 {
         // All at either end, and some mixtures.
         let mut rng = Pcg64Mcg::seed_from_u64(1);
@@ -139,12 +141,28 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     sets.iter().map(|set| block(kind, |p| value(set, p.name))).collect()
 }
 
+/// Blocks of a rough surface: even ones from the narrowest to the widest, and stretched ones, with both distributions;
+/// what else there is goes through its range beside them.
+fn surfaces(kind: LobeKind) -> Vec<Vec<f32>> {
+    let is_width = |p: &ParamSpec| p.name.ends_with("alpha") || p.name.starts_with("roughness_");
+    let widths = [(1e-4, 1e-4), (0.03, 0.03), (0.1, 0.1), (0.3, 0.3), (0.6, 0.6), (1.0, 1.0), (0.05, 0.4), (1.0, 0.3)];
+    let set = |(k, (x, y)): (usize, (f32, f32))| {
+        block(kind, |p| {
+            let t = [0.0, 1.0, 0.4, 0.1][k / 2 % 4];
+            match p.ty {
+                ParamTy::Float if is_width(p) => Some(if p.name.contains('x') { x } else { y }),
+                ParamTy::Float => Some(p.min.max(0.0) + (p.max.min(10.0) - p.min.max(0.0)) * t),
+                ParamTy::String => Some((k % 2) as f32),
+                ParamTy::Int => Some((p.min + t * (p.max - p.min)).round()),
+                _ => None,
+            }
+        })
+    };
+    widths.into_iter().enumerate().map(set).collect()
+}
+
 /// Whether a block differs from another only in a switch its model does not look at.
 fn says_it_again(value: impl Fn(&str) -> Option<f32>) -> bool {
-    // Other names of "ggx".
-    if value("distribution").is_some_and(|d| d > 1.0) {
-        return true;
-    }
     let (Some(mode), Some(model), Some(softening)) = (value("mode"), value("model"), value("softening")) else {
         return false;
     };
