@@ -3,31 +3,8 @@
 //! A tensor product of Gauss–Kronrod (7, 15) rules; the rectangle with the largest error is halved along the
 //! direction that contributes most to it, until the sum of errors is below the tolerance. Deterministic.
 
+use crate::albedo::quadrature::{GAUSS, KRONROD, NODES};
 use std::collections::BinaryHeap;
-
-/// Nodes of the 15-point Kronrod rule on [−1, 1], the positive half; every second one belongs to the 7-point Gauss rule.
-const NODES: [f64; 8] = [
-    0.991_455_371_120_812_6,
-    0.949_107_912_342_758_5,
-    0.864_864_423_359_769_1,
-    0.741_531_185_599_394_4,
-    0.586_087_235_467_691_1,
-    0.405_845_151_377_397_2,
-    0.207_784_955_007_898_47,
-    0.0,
-];
-const KRONROD: [f64; 8] = [
-    0.022_935_322_010_529_224,
-    0.063_092_092_629_978_55,
-    0.104_790_010_322_250_18,
-    0.140_653_259_715_525_92,
-    0.169_004_726_639_267_9,
-    0.190_350_578_064_785_4,
-    0.204_432_940_075_298_9,
-    0.209_482_141_084_727_82,
-];
-const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_7, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// An integral per channel, with an estimate of its absolute error (the largest over the channels).
 #[derive(Clone, Copy, Debug, PartialEq)]

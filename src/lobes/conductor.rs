@@ -45,7 +45,7 @@ pub struct Conductor<S> {
 
 /// For [`Facet::Mirror`]: the key holds n, then k.
 fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
-    Reflectance::Conductor([key[0], key[1], key[2]], [key[3], key[4], key[5]]).at(c)
+    Reflectance::Conductor([key[0], key[1], key[2]], [key[3], key[4], key[5]]).at(c, 1.0 - c)
 }
 
 impl<S: Real> Lobe<S> for Conductor<S> {

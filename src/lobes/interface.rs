@@ -215,11 +215,12 @@ impl<S: Real> Interface<S> {
         let inv = one / self.far;
         let f = fresnel::dielectric((self.far - one) * (self.far + one), c);
         let reflects = u1_left.lt(self.chance(f));
-        let cos_t = (one - (one - c * c) * inv * inv).safe_sqrt();
+        let cos2 = one - (one - c * c) * inv * inv;
+        let cos_t = cos2.safe_sqrt();
         let bent = h.scale(c.mul_add(inv, -cos_t)) - wo.scale(inv);
         let mirrored = mirror(wo, h);
         // A facet may send light where its kind of scattering is not: no direction at all.
-        let lands = (mirrored.z.gt(zero) & reflects) | (bent.z.lt(zero) & !reflects);
+        let lands = (mirrored.z.gt(zero) & reflects) | (bent.z.lt(zero) & cos2.gt(zero) & !reflects);
         let bright = choose(reflects, mirrored, bent).map(|x| S::select(lands, x, zero));
         up(choose(even, flat, bright))
     }

@@ -41,16 +41,16 @@ pub(super) enum Reflectance<S> {
 }
 
 impl<S: Real> Reflectance<S> {
-    /// At the cosine between direction and facet.
+    /// At the cosine `c` between direction and facet; `fall` is 1 − c with all its digits.
     #[inline(always)]
-    pub(super) fn at<L: Real + Lift<S>>(&self, c: L) -> Rgb<L> {
+    pub(super) fn at<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
         match self {
             Reflectance::White => [L::one(); 3],
             Reflectance::Conductor(n, k) => {
                 std::array::from_fn(|i| fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c))
             }
             Reflectance::Schlick(f0, f90, exponent) => {
-                let weight = fresnel::schlick_weight(L::lift(*exponent), c);
+                let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
                 std::array::from_fn(|i| (L::lift(f90[i]) - L::lift(f0[i])).mul_add(weight, L::lift(f0[i])))
             }
         }
@@ -73,7 +73,7 @@ impl<S: Real> Reflectance<S> {
                 ];
                 let mut sum = [S::zero(); 3];
                 for (c, weight) in POINTS {
-                    let f = self.at(S::c(c));
+                    let f = self.at(S::c(c), S::c(1.0 - c));
                     for i in 0..3 {
                         sum[i] = f[i].mul_add(S::c(weight), sum[i]);
                     }
@@ -133,7 +133,10 @@ impl<S: Real> Reflector<S> {
         let h = wo + wi;
         let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
         let single = self.facets.d(h) * L::c(0.5) / shadowed.max(L::c(1e-18));
-        let part = self.reflectance.at(L::c(0.5) * h.length_squared().sqrt());
+        let c = L::c(0.5) * h.length_squared().sqrt();
+        // 1 − c² is the square of half the difference.
+        let fall = L::c(0.25) * (wo - wi).length_squared() / (L::one() + c);
+        let part = self.reflectance.at(c, fall);
         let missing = tables.missing(wi, self.facets.alpha());
         let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
         std::array::from_fn(|c| {

@@ -51,7 +51,7 @@ pub struct GeneralizedSchlick<S> {
 
 /// For [`Facet::Mirror`]: the key holds F0, F90 and the exponent.
 fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
-    Reflectance::Schlick([key[0], key[1], key[2]], [key[3], key[4], key[5]], key[6]).at(c)
+    Reflectance::Schlick([key[0], key[1], key[2]], [key[3], key[4], key[5]], key[6]).at(c, 1.0 - c)
 }
 
 impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {

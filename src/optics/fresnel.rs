@@ -61,18 +61,6 @@ pub fn artistic<L: Real>(r: L, g: L) -> (L, L) {
     (n, k2.safe_sqrt())
 }
 
-/// F0 + (F90 − F0)·(1 − c)^exponent (Schlick 1994 with both ends and the exponent free).
-#[inline(always)]
-pub fn schlick<L: Real>(f0: L, f90: L, exponent: L, c: L) -> L {
-    (f90 - f0).mul_add(schlick_weight(exponent, c), f0)
-}
-
-/// (1 − c)^exponent.
-#[inline(always)]
-pub fn schlick_weight<L: Real>(exponent: L, c: L) -> L {
-    (L::one() - c.clamp(L::zero(), L::one())).powf(exponent)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
