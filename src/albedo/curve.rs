@@ -131,6 +131,26 @@ where
     }
 }
 
+impl<S: Scalar> AlbedoCurve<S> {
+    /// The same numbers in double precision.
+    pub fn in_double(&self) -> AlbedoCurve<f64> {
+        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+        AlbedoCurve {
+            view: all(&self.view),
+            bound: all(&self.bound),
+            view_bound: all(&self.view_bound),
+            excess: all(&self.excess),
+            extra: all(&self.extra),
+            cos_nodes: self.cos_nodes,
+            rows: self.rows,
+            lo: self.lo.to_f64(),
+            inv_range: self.inv_range.to_f64(),
+            fibre: self.fibre.in_double(),
+            facets: self.facets.in_double(),
+        }
+    }
+}
+
 impl<S: Real> AlbedoCurve<S> {
     /// E_view for the direction `w`; `parameter` is the varying one and is ignored if none varies. 0 below the surface.
     #[inline(always)]

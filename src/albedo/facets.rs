@@ -7,9 +7,6 @@
 //! `missing` is M(ω) ≤ 1 − E(ω), never above it: what the lobe may scatter once more without gaining. Nodes lie over
 //! μ^¼, and over the azimuth for a stretched surface or over α^¼ where α varies from point to point. There M is 0
 //! for a stretched surface: no simple function of the rows stays above its E.
-//!
-//! Limit: where total reflection begins, a stretched surface turns faster with azimuth and cosine than its nodes lie; there
-//! the parts are off by up to 1e-2, and up to as much is lost.
 
 use super::curve::{Precision, parallel};
 use super::quadrature::{Rule, adaptive};
@@ -239,6 +236,25 @@ impl<S: Real> FacetTables<S> {
 }
 
 impl<S: Scalar> FacetTables<S> {
+    pub(super) fn in_double(&self) -> FacetTables<f64> {
+        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+        FacetTables {
+            missing: all(&self.missing),
+            view: all(&self.view),
+            bound: all(&self.bound),
+            means: all(&self.means),
+            kind: match self.kind {
+                Rows::One => Rows::One,
+                Rows::Azimuth(roots) => Rows::Azimuth(roots.map(S::to_f64)),
+                Rows::Alpha => Rows::Alpha,
+            },
+            sheets: self.sheets,
+            rows: self.rows,
+            nodes: self.nodes,
+            parts: self.parts,
+        }
+    }
+
     /// The directions of the nodes about cosines between `cos.0` and `cos.1` (signed); of one row where the rows are a
     /// width's. What is read between them is linear in what is read there.
     pub fn directions(&self, cos: (f64, f64)) -> impl Iterator<Item = V3<f64>> {

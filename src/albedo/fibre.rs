@@ -133,6 +133,22 @@ impl<S> Default for FibreTables<S> {
     }
 }
 
+impl<S: Scalar> FibreTables<S> {
+    pub(super) fn in_double(&self) -> FibreTables<f64> {
+        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+        FibreTables {
+            view: all(&self.view),
+            bound: all(&self.bound),
+            components: self.components,
+            sheets: self.sheets,
+            rows: self.rows,
+            nodes: self.nodes,
+            axis: self.axis,
+            crossed: self.crossed,
+        }
+    }
+}
+
 impl<S: Real> FibreTables<S> {
     /// Whether nothing was baked, because too many parameters vary.
     pub fn is_empty(&self) -> bool {

@@ -5,11 +5,12 @@
 //! roughness, if both tints are white ([`super::interface`]). As a coat over a closure use it with a black
 //! `transmission_tint`: then only what it reflects is taken from the base.
 //!
-//! Where this departs from the source: roughness is used as the width α of the slopes; no thin film.
+//! Where this departs from the source: roughness is used as the width α of the slopes, the geometric mean of both;
+//! no thin film.
 
 use super::interface::{Interface, index};
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, known_widths, widths};
+use super::rough::{DISTRIBUTIONS, known_width};
 use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -55,12 +56,11 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[7].clamp(0, values[15]?) as usize];
         let facet = Facet::Dielectric { eta: index(SPEC.params[6].clamp(0, values[14]?)) };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 4, 12, values), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_width(SPEC, 4, 12, values), facet }))
     }
 
-    fn follows_tangent(params: &DielectricParams) -> bool {
-        let [x, y] = widths([params.roughness_x, params.roughness_y]);
-        x != y
+    fn follows_tangent(_: &DielectricParams) -> bool {
+        false
     }
 
     fn between_media(_: &DielectricParams) -> bool {

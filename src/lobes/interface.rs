@@ -10,10 +10,13 @@
 //! Conty 2017). Either way across carries the same flux if (1 − x)·M̄ = (1 − x′)·η²·M̄′; we take
 //! T·min(M̄, η²·M̄′) for both, T = 4η/(1 + η)². Then reflection and refraction sum to E + M from both media.
 //!
+//! Limit: such a surface is not stretched, two widths count as their geometric mean. Next to the edge of total reflection
+//! the albedo of a stretched one turns so fast with azimuth and cosine that no small table keeps it below 1.
+//!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
 use super::Rgb;
-use super::rough::widths;
+use super::rough::even;
 use crate::albedo::facets::FacetTables;
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
@@ -62,7 +65,7 @@ impl<S: Real> Interface<S> {
         wo: V3<S>,
         tables: &FacetTables<S>,
     ) -> Self {
-        let alpha = widths(alpha).map(S::from_f32);
+        let alpha = [S::from_f32(even(alpha)); 2];
         let facets = Facets::new(shape, alpha);
         let outside = wo.z.gt(S::zero());
         // Both are computed, because a Real cannot branch.

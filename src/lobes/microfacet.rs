@@ -14,7 +14,7 @@
 
 use super::interface::{Interface, index};
 use super::registry::{Build, ClosureParams, Form, LobeSpec, ParamSpec, SlotSource, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, widths};
+use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
 use super::{Lobe, LobeKind, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -96,17 +96,17 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         let value = |param: usize, slot: usize| values[slot].map(|v| SPEC.params[param].clamp(0, v));
         let shape = DISTRIBUTIONS[value(0, 0)? as usize];
         let eta = value(5, 9)?;
-        let facet = if two_media(eta, value(6, 10)? as u32) {
-            Facet::Dielectric { eta: index(eta) }
+        let (alpha, facet) = if two_media(eta, value(6, 10)? as u32) {
+            (known_width(SPEC, 3, 7, values), Facet::Dielectric { eta: index(eta) })
         } else {
-            Facet::Mirror { reflectance: white, key: [0.0; 8], parts: 0 }
+            (known_widths(SPEC, 3, 7, values), Facet::Mirror { reflectance: white, key: [0.0; 8], parts: 0 })
         };
-        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 3, 7, values), facet }))
+        Some(TableSpec::Facets(FacetSpec { shape, alpha, facet }))
     }
 
     fn follows_tangent(params: &MicrofacetParams) -> bool {
         let [x, y] = widths([params.xalpha, params.yalpha]);
-        x != y
+        x != y && !two_media(params.eta, params.refract)
     }
 
     fn between_media(params: &MicrofacetParams) -> bool {

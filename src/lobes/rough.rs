@@ -23,10 +23,25 @@ pub(super) fn widths(alpha: [f32; 2]) -> [f32; 2] {
     alpha.map(|a| a.max(floor))
 }
 
+/// The one width that a surface between two media has: the geometric mean of both.
+pub(super) fn even(alpha: [f32; 2]) -> f32 {
+    let [x, y] = widths(alpha);
+    (x * y).sqrt()
+}
+
 /// The widths of a table, if both are known: the parameter `first`, which begins at `slot`, and the one after it.
 pub(super) fn known_widths(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f64; 2]> {
+    known(spec, first, slot, values).map(|alpha| widths(alpha).map(f64::from))
+}
+
+/// The same of a surface between two media.
+pub(super) fn known_width(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f64; 2]> {
+    known(spec, first, slot, values).map(|alpha| [f64::from(even(alpha)); 2])
+}
+
+fn known(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f32; 2]> {
     let value = |k: usize| Some(spec.params[first + k].clamp(0, values[slot + k]?));
-    Some(widths([value(0)?, value(1)?]).map(f64::from))
+    Some([value(0)?, value(1)?])
 }
 
 /// What a facet reflects.
