@@ -68,6 +68,7 @@ impl Scatter for ClothAt {
                 pdf: holes,
                 weight,
                 flags,
+                eta: 1.0,
             });
         }
         let n = if u[2] < reflect { self.n } else { -self.n };
@@ -76,7 +77,7 @@ impl Scatter for ClothAt {
         let wi = t * (r * phi.cos()) + b * (r * phi.sin()) + n * (1.0 - u[0]).sqrt();
         let Eval { f_cos, pdf } = self.eval(wi);
         let flags = SampleFlags { transmit: n.dot(self.n) < 0.0, delta: false };
-        (pdf > 0.0).then_some(Sample { wi: wi.to_array(), f_cos, pdf, weight: [1.0; 3], flags })
+        (pdf > 0.0).then_some(Sample { wi: wi.to_array(), f_cos, pdf, weight: [1.0; 3], flags, eta: 1.0 })
     }
 
     fn emission(&self) -> [f32; 3] {

@@ -5,9 +5,11 @@
 
 mod bends;
 pub mod curve;
+pub mod facets;
 pub mod fibre;
 mod panels;
 pub mod quadrature;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
+pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
 pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, OFFSETS, Ridges, TableSpec};

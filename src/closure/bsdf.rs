@@ -34,6 +34,9 @@ pub struct Sample<S = f32> {
     pub weight: Rgb<S>,
     /// What kind of scattering it is.
     pub flags: SampleFlags,
+    /// Index of refraction on ωi's side over that on ωo's: 1 unless the sampled lobe refracts. Radiance carried from ωi
+    /// to ωo is divided by its square; f is not.
+    pub eta: S,
 }
 
 /// What kind of scattering a sample is.
@@ -108,9 +111,9 @@ pub struct Bsdf<'m, S: Real = f32> {
 enum Cosine {
     /// |N·ωi|: light arriving from ωi, seen from ωo.
     Light,
-    /// |N·ωo|: the adjoint.
+    /// |N·ωo|: the adjoint, f·(ηo/ηi)².
     View,
-    /// None: f itself.
+    /// None: f·ηo/ηi, which is symmetric where f is reciprocal.
     None,
 }
 
@@ -195,12 +198,13 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             + 4 * size_of::<usize>()
     }
 
-    /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi|: what E_light integrates over ωo.
+    /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi| and, across media, times (ηo/ηi)²: what E_light integrates
+    /// over ωo.
     pub fn eval_adjoint(&self, wi: [S; 3]) -> Rgb<S> {
         self.sum(vector(wi), Cosine::View, |_, _| {})
     }
 
-    /// Σ w·f without cosines: symmetric in its directions if the BSDF is reciprocal.
+    /// Σ w·f without cosines, times ηo/ηi across media: symmetric in its directions if the BSDF is reciprocal.
     pub fn f(&self, wi: [S; 3]) -> Rgb<S> {
         self.sum(vector(wi), Cosine::None, |_, _| {})
     }
@@ -217,18 +221,21 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
             let flags = SampleFlags { transmit: transmit(wi), delta: true };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags);
+            let eta = S::one() / l.lobe.relative_eta(local);
+            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, eta);
         }
-        let wi = frame.to_world(l.lobe.sample([u[0], u[1]]));
+        let local = l.lobe.sample([u[0], u[1]]);
+        let wi = frame.to_world(local);
         let eval = self.eval([wi.x, wi.y, wi.z]);
-        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false })
+        let flags = SampleFlags { transmit: transmit(wi), delta: false };
+        Self::sampled(wi, eval, flags, S::one() / l.lobe.relative_eta(local))
     }
 
-    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags) -> Option<Sample<S>> {
+    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, eta: S) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
         let fine = pdf > S::zero() && weight.iter().all(|w| w.is_finite());
-        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags })
+        fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta })
     }
 
     /// The lobe that `u` in [0, 1) falls to.
@@ -468,8 +475,8 @@ fn weighted<S: Scalar, L: Real + Lift<S>>(l: &FlatLobe<'_, S>, scale: Rgb<L>, lo
     let f = l.lobe.f(local, l.curve);
     let cos = match cosine {
         Cosine::Light => local.z.abs().min(L::one()),
-        Cosine::View => L::lift(l.cos_o),
-        Cosine::None => L::one(),
+        Cosine::View => L::lift(l.cos_o) * l.lobe.relative_eta(local).sq(),
+        Cosine::None => l.lobe.relative_eta(local),
     };
     std::array::from_fn(|c| L::lift(l.weight[c]) * scale[c] * f[c] * cos)
 }

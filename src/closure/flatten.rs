@@ -36,6 +36,15 @@ impl<S: Scalar> Curves<S> {
         curves
     }
 
+    /// The same tables in double precision.
+    pub fn in_double(&self) -> Curves<f64> {
+        Curves {
+            baked: self.baked.iter().map(|(spec, curve)| (*spec, curve.in_double())).collect(),
+            sites: self.sites.clone(),
+            none: AlbedoCurve::default(),
+        }
+    }
+
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
     pub fn set(&mut self, site: u32, spec: Option<TableSpec>, precision: Precision) {
         let Some(spec) = spec else { return };

@@ -11,18 +11,25 @@ pub mod registry;
 mod charlie_terms;
 mod cloth;
 mod cloth_range;
+pub mod conductor;
 pub mod cylinder;
+pub mod dielectric;
 pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
 pub mod host;
+mod interface;
 pub mod limits;
 mod ltc_tables;
 pub mod microcylinder;
 pub mod microcylinder_threads;
+pub mod microfacet;
 pub mod oren_nayar;
+mod rough;
+pub mod schlick;
 pub mod sheen;
+pub mod specular;
 pub mod thread;
 pub mod translucent;
 pub mod transparent;
@@ -67,6 +74,25 @@ pub trait Lobe<S: Real>: Sized + Copy {
     fn reciprocal(params: &Self::Params) -> bool {
         let _ = params;
         Self::Params::SPEC.reciprocal
+    }
+
+    /// Whether f of this instance depends on where the tangent points.
+    fn follows_tangent(params: &Self::Params) -> bool {
+        let _ = params;
+        Self::Params::SPEC.tangent_slot().is_some()
+    }
+
+    /// Whether it lies between two media: z points to the outside, also where the host turned N toward a viewer inside.
+    fn between_media(params: &Self::Params) -> bool {
+        let _ = params;
+        false
+    }
+
+    /// The index of refraction on ωo's side over that on ωi's; 1 unless light crosses into another medium. The adjoint
+    /// of f is f times its square.
+    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let _ = wi;
+        L::one()
     }
 
     /// Prepares everything that depends on the parameters and on ωo alone.
@@ -164,6 +190,23 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
             }
 
+            /// Whether f of a lobe with these parameter values depends on where its tangent points; of a host's lobe that
+            /// is not known.
+            pub fn follows_tangent(self, values: &[f32]) -> bool {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::follows_tangent(&params)
+                }, )* LobeKind::Host(_) => true }
+            }
+
+            /// See [`Lobe::between_media`].
+            pub fn between_media(self, values: &[f32]) -> bool {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::between_media(&params)
+                }, )* LobeKind::Host(_) => false }
+            }
+
             /// The color that multiplies a lobe with these parameter values.
             pub fn weight(self, values: &[f32]) -> Rgb32 {
                 match self { $( LobeKind::$Lobe => {
@@ -219,6 +262,11 @@ macro_rules! lobes {
             pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
                 match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
+            /// See [`Lobe::relative_eta`].
+            #[inline]
+            pub fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+                match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
+            }
             /// See [`Lobe::delta`].
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
@@ -241,6 +289,12 @@ lobes! {
     microcylinder_threads::MicrocylinderThreads,
     velvet::Velvet,
     eon::Eon,
+    microfacet::Microfacet,
+    dielectric::Dielectric,
+    conductor::Conductor,
+    schlick::GeneralizedSchlick,
+    specular::Reflection,
+    specular::Refraction,
 }
 
 impl LobeKind {
@@ -293,5 +347,6 @@ const LAYER: Form = Form {
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(sheen::FORMS.iter().copied())
+    let lists = [sheen::FORMS, microfacet::FORMS, specular::FORMS];
+    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

@@ -265,7 +265,7 @@ impl Scatter for Matte {
         let wi = Vec3::new(r * cos, (1.0 - u[0]).sqrt(), r * sin);
         let Eval { f_cos, pdf } = self.eval(wi);
         let weight = FLOOR_ALBEDO.to_array();
-        (pdf > 0.0).then_some(Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default() })
+        (pdf > 0.0).then_some(Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default(), eta: 1.0 })
     }
 
     fn emission(&self) -> Rgb32 {

@@ -90,7 +90,7 @@ impl Scatter for UniformScatter<'_> {
         let wi = t * (r * cos) + b * (r * sin) + self.n * u[0];
         let Eval { f_cos, pdf } = self.eval(wi);
         let weight = f_cos.map(|f| f / pdf);
-        (pdf > 0.0).then(|| Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default() })
+        (pdf > 0.0).then(|| Sample { wi: wi.into(), f_cos, pdf, weight, flags: SampleFlags::default(), eta: 1.0 })
     }
 
     fn emission(&self) -> Rgb32 {
