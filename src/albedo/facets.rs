@@ -372,14 +372,17 @@ impl Grid<'_> {
         self.rule.albedos(self.spec, alpha, w)
     }
 
-    /// By how much the truth between the nodes exceeds what is read there: a quarter more than the middles of cells show. E is
-    /// smooth, and off most there.
+    /// By how much the truth between the nodes exceeds what is read there: a quarter more than the middles of cells and
+    /// of their edges show. E is smooth, and off most in the middle.
     fn shortfalls<S: Scalar>(&self, tables: &FacetTables<S>) -> Vec<[f64; PARTS + 1]> {
         let mut probes: Vec<(usize, f64, f64)> = Vec::new();
         for sheet in 0..tables.sheets {
-            for row in 0..(self.rows - 1).max(1) {
-                let row = if self.rows > 1 { row as f64 + 0.5 } else { 0.0 };
+            for half in 0..2 * self.rows - 1 {
+                let row = half as f64 / 2.0;
                 probes.extend((0..self.nodes - 1).map(|n| (sheet, row, n as f64 + 0.5)));
+                if half % 2 == 1 {
+                    probes.extend((0..self.nodes).map(|n| (sheet, row, n as f64)));
+                }
             }
         }
         let missed = parallel(&probes, |&(sheet, row, node)| {

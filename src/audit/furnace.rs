@@ -288,16 +288,21 @@ pub(super) fn delta_albedo<'m, S: Scalar>(
     if side == Side::View {
         return held.delta_albedo().map(S::to_f64);
     }
-    // Light from ω leaves a delta lobe along the direction the lobe would show to a viewer there.
-    let mut seen: Vec<[S; 3]> = Vec::new();
+    // Light from ω leaves a delta lobe along the direction the lobe would show to a viewer there. Lobes are told apart by
+    // where they were constructed: toward the horizon the directions of different ones meet.
+    let mut seen: Vec<(LobeKind, u32, [S; 3])> = Vec::new();
     let mut sum = [0.0; 3];
-    for (direction, _) in held.delta_parts() {
-        if seen.iter().any(|d| dot(*d, direction) > 1.0 - 1e-6) {
+    for lobe in 0..held.lobe_count() {
+        let Some(direction) = held.lobe_delta_direction(lobe) else { continue };
+        let (kind, site) = held.lobe_kind(lobe);
+        if seen.iter().any(|s| (s.0, s.1) == (kind, site) && dot(s.2, direction) > 1.0 - 1e-6) {
             continue;
         }
-        seen.push(direction);
-        for (back, part) in subject.bsdf(direction).delta_parts() {
-            if dot(back, w) > 1.0 - 1e-6 {
+        seen.push((kind, site, direction));
+        let there = subject.bsdf(direction);
+        for other in (0..there.lobe_count()).filter(|o| there.lobe_kind(*o) == (kind, site)) {
+            if there.lobe_delta_direction(other).is_some_and(|back| dot(back, w) > 1.0 - 1e-6) {
+                let part = there.lobe_delta(other, true).unwrap_or([S::zero(); 3]);
                 for c in 0..3 {
                     sum[c] += part[c].to_f64();
                 }

@@ -301,11 +301,14 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// The delta lobes: the direction each scatters to (world space) and how much, weights and layers included.
     pub fn delta_parts(&self) -> impl Iterator<Item = ([S; 3], Rgb<S>)> {
-        (0..self.lobes.len()).filter_map(|i| {
-            let (local, _) = self.lobes[i].lobe.delta()?;
-            let wi = self.frames[self.lobes[i].frame as usize].to_world(local);
-            Some(([wi.x, wi.y, wi.z], self.lobe_delta(i, true)?))
-        })
+        (0..self.lobes.len()).filter_map(|i| Some((self.lobe_delta_direction(i)?, self.lobe_delta(i, true)?)))
+    }
+
+    /// The direction delta lobe `index` scatters to, in world space; `None` for other lobes.
+    pub(crate) fn lobe_delta_direction(&self, index: usize) -> Option<[S; 3]> {
+        let (local, _) = self.lobes[index].lobe.delta()?;
+        let wi = self.frames[self.lobes[index].frame as usize].to_world(local);
+        Some([wi.x, wi.y, wi.z])
     }
 
     /// What delta lobe `index` scatters, with or without the layers above it (which look at ωo and at its own
