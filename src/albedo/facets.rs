@@ -457,7 +457,7 @@ const HALVINGS: usize = 6;
 impl FacetQuadrature {
     /// As fine as a precision asks for.
     pub fn new(precision: Precision) -> Self {
-        FacetQuadrature { along: Rule::gauss_legendre(precision.polar / 2 + 4), error: precision.margin }
+        FacetQuadrature { along: Rule::gauss_legendre(precision.polar), error: precision.margin }
     }
 
     /// E and its parts at `w`, whose z may be negative for a dielectric; and how far off they may be.
