@@ -71,27 +71,38 @@ fn shade(bencher: Bencher, text: &str) {
     let material = material(text);
     let mut tree = overcoat::closure::ClosureTree::new();
     let mut globals = Globals::default();
+    let mut k = 0u32;
     bencher.bench_local(|| {
-        globals.u = (globals.u + 0.37) % 1.0;
+        k = k.wrapping_add(97);
+        globals.u = (k & 255) as f32 / 256.0;
         globals.p.x = globals.u;
         globals.p.y = 1.0 - globals.u;
         material.program().shade(black_box(&globals), &mut tree)
     });
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_velvet(bencher: Bencher) {
     shade(bencher, VELVET);
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_velvet_varying(bencher: Bencher) {
     shade(bencher, "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);");
 }
 
-#[divan::bench]
+#[divan::bench(sample_size = 1000)]
 fn shade_noise(bencher: Bencher) {
     shade(bencher, NOISE);
+}
+
+/// From a point to a BSDF: the tree and its preparation for one direction.
+#[divan::bench(sample_size = 1000)]
+fn velvet_to_bsdf(bencher: Bencher) {
+    let material = material(VELVET);
+    let globals = Globals::default();
+    let wo = glam::vec3(0.48, 0.36, 0.8);
+    bencher.bench_local(|| material.shade(black_box(&globals), black_box(wo)).is_ok());
 }
 
 fn main() {

@@ -232,6 +232,7 @@ impl Shader {
     fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
         let tables = Baked::new(&program, self.engine.layering, self.engine.tier.precision());
+        program.kept();
         let inner = Inner {
             engine: self.engine.clone(),
             name: self.name().to_owned(),
@@ -356,7 +357,9 @@ impl Material {
     ) -> Result<Bsdf<'m, S>, ShadeError> {
         let i = wo.map(|x| -x.to_f32());
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
-        let tree = self.tree(&globals)?;
+        // Written in place: a tree with room for a typical material is too large to pass around.
+        let mut tree = ClosureTree::new();
+        self.inner.program.shade(&globals, &mut tree)?;
         let tables = Tables { curves: &tables.curves, balance: tables.balance.as_ref() };
         Ok(flatten(&tree, &globals, wo, self.inner.engine.layering, tables)?)
     }

@@ -51,10 +51,12 @@ pub const MAX_WEIGHT: f32 = 1e30;
 /// Closures as a shader composes them. Build with the methods below; the last call is to [`set_root`](Self::set_root).
 #[derive(Clone, Debug)]
 pub struct ClosureTree {
-    nodes: SmallVec<[Node; 40]>,
-    sizes: SmallVec<[Size; 40]>,
+    /// With what each comes to.
+    nodes: SmallVec<[(Node, Size); 40]>,
     slots: SmallVec<[f32; 96]>,
     root: NodeId,
+    /// The number of the tree this is a copy of but for directions; 0 once it is changed otherwise.
+    copy_of: u64,
 }
 
 /// How much a node comes to when it is written out in full: a node may be used twice, so a tree of sixty nodes can
@@ -117,8 +119,7 @@ impl Default for ClosureTree {
 impl ClosureTree {
     /// A black tree.
     pub fn new() -> Self {
-        let mut tree =
-            ClosureTree { nodes: SmallVec::new(), sizes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0) };
+        let mut tree = ClosureTree { nodes: SmallVec::new(), slots: SmallVec::new(), root: NodeId(0), copy_of: 0 };
         tree.push(Node::Zero);
         tree
     }
@@ -126,9 +127,27 @@ impl ClosureTree {
     /// Back to black, keeping what memory there is.
     pub fn clear(&mut self) {
         self.nodes.truncate(1);
-        self.sizes.truncate(1);
         self.slots.clear();
         self.root = NodeId(0);
+        self.copy_of = 0;
+    }
+
+    /// Becomes a copy of the tree with this number; nothing is to do if it is one already.
+    pub(crate) fn become_copy(&mut self, id: u64, other: &ClosureTree) {
+        if self.copy_of == id {
+            return;
+        }
+        self.clear();
+        self.nodes.clear();
+        self.nodes.extend_from_slice(&other.nodes);
+        self.slots.extend_from_slice(&other.slots);
+        self.root = other.root;
+        self.copy_of = id;
+    }
+
+    /// Changes a direction among the parameters of a lobe.
+    pub(crate) fn set_direction(&mut self, slot: u32, value: [f32; 3]) {
+        self.slots[slot as usize..slot as usize + 3].copy_from_slice(&value);
     }
 
     /// The black closure.
@@ -181,13 +200,30 @@ impl ClosureTree {
     /// not in a script.
     pub fn lobe(&mut self, kind: LobeKind, site: u32, values: &[f32]) -> NodeId {
         assert_eq!(values.len(), kind.spec().slot_count(), "parameter block of `{}`", kind.spec().name);
-        let slots = self.slots.len() as u32;
-        self.slots.extend_from_slice(values);
-        self.push(Node::Lobe { kind, site, slots })
+        self.lobe_from(kind, site, values, std::iter::empty())
+    }
+
+    /// A lobe whose parameter block is `known` but for the slots in `open`.
+    pub(crate) fn lobe_from(
+        &mut self,
+        kind: LobeKind,
+        site: u32,
+        known: &[f32],
+        open: impl Iterator<Item = (u32, f32)>,
+    ) -> NodeId {
+        let start = self.slots.len();
+        // A block is short: `extend_from_slice` would call to copy it.
+        self.slots.extend(known.iter().copied());
+        let slots = &mut self.slots[start..];
+        for (slot, value) in open {
+            slots[slot as usize] = value;
+        }
+        self.push(Node::Lobe { kind, site, slots: start as u32 })
     }
 
     /// Makes `root` the closure the tree stands for.
     pub fn set_root(&mut self, root: NodeId) {
+        self.copy_of = 0;
         self.root = root;
     }
 
@@ -198,7 +234,7 @@ impl ClosureTree {
 
     /// What a node is.
     pub fn node(&self, id: NodeId) -> Node {
-        self.nodes[id.index()]
+        self.nodes[id.index()].0
     }
 
     /// The node made at this place, counted from the black one.
@@ -223,15 +259,23 @@ impl ClosureTree {
 
     /// Every lobe node made: its site, kind and parameter block.
     pub fn lobes(&self) -> impl Iterator<Item = (u32, LobeKind, &[f32])> {
-        self.nodes.iter().filter_map(|n| match *n {
+        self.nodes.iter().filter_map(|(n, _)| match *n {
             Node::Lobe { kind, site, slots } => Some((site, kind, self.values(kind, slots))),
+            _ => None,
+        })
+    }
+
+    /// Of every lobe node made: its site and where its values start.
+    pub(crate) fn lobe_slots(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.nodes.iter().filter_map(|(n, _)| match *n {
+            Node::Lobe { site, slots, .. } => Some((site, slots)),
             _ => None,
         })
     }
 
     /// What a node comes to, written out.
     pub fn size(&self, id: NodeId) -> Size {
-        self.sizes[id.index()]
+        self.nodes[id.index()].1
     }
 
     /// Whether the tree is within [`MAX_LOBES`] and [`MAX_LAYERS`].
@@ -262,8 +306,8 @@ impl ClosureTree {
                 Size { layers: size.layers.saturating_add(1), ..size }
             }
         };
-        self.nodes.push(node);
-        self.sizes.push(size);
+        self.nodes.push((node, size));
+        self.copy_of = 0;
         id
     }
 }

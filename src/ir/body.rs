@@ -70,6 +70,7 @@ macro_rules! globals {
             }
 
             /// Its value at a point.
+            #[inline]
             pub fn read(self, globals: &Globals) -> Cells {
                 match self { $( GlobalVar::$name => ($read as fn(&Globals) -> Cells)(globals) ),* }
             }

@@ -4,13 +4,16 @@
 //! Expressions are walked with an explicit stack, and temporaries are given out as a stack too: an operation's result
 //! takes the place where its operands began. `&&`, `||` and `? :` become jumps.
 
-use super::body::{Body, ExprId, ExprKind, Op, Root, Stmt, VarId};
+use super::body::{Args, Body, ExprId, ExprKind, Op, Root, Stmt, VarId};
+use super::builtins::{BUILTINS, Eval, Repeats};
 use super::passes::layers::Layers;
 use super::passes::needs::Needs;
-use super::program::{Call, Instr, Program, Site};
+use super::program::{Call, Instr, Maker, Program, Site};
 use super::types::Ty;
 use crate::diag::Diagnostic;
+use crate::lobes::LobeKind;
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// Lowers a body whose live expressions are marked in `needs`.
 pub fn lower(body: &Body, needs: &Needs, layers: &Layers, warnings: Vec<Diagnostic>) -> Program {
@@ -18,20 +21,23 @@ pub fn lower(body: &Body, needs: &Needs, layers: &Layers, warnings: Vec<Diagnost
     lower.block(&body.stmts);
     let strings = body.strings.clone();
     let site = |id: ExprId| lower.site_of.get(&id.0).copied();
+    let mut image = lower.image;
+    image.resize(lower.max_cells as usize, 0);
     let layer_pairs = layers.pairs().into_iter().filter_map(|(top, base)| Some((site(top)?, site(base)?))).collect();
     Program {
         code: lower.code,
         args: lower.args,
-        image: lower.image,
-        registers: lower.max_cells as usize,
+        image,
         closures: lower.max_closures as usize,
         ci: lower.closure_vars[VarId::CI.index()],
         sites: lower.sites,
+        makers: lower.makers,
         deeds: lower.deeds,
         layer_pairs,
         strings,
         globals: needs.globals.iter().copied().collect(),
         constant: !needs.varying,
+        kept: (!needs.varying).then(OnceLock::new),
         warnings,
         host: None,
         iterations: u32::MAX,
@@ -79,6 +85,7 @@ struct Lower<'a> {
     max_closures: u32,
     values: Vec<Reg>,
     sites: Vec<Site>,
+    makers: Vec<Maker>,
     deeds: Vec<Call>,
     /// The site of each lobe expression.
     site_of: HashMap<u32, u32>,
@@ -100,6 +107,7 @@ impl<'a> Lower<'a> {
             max_closures: 1,
             values: Vec::new(),
             sites: Vec::new(),
+            makers: Vec::new(),
             deeds: Vec::new(),
             site_of: HashMap::new(),
         };
@@ -356,11 +364,24 @@ impl<'a> Lower<'a> {
             ExprKind::Op(Op::MulC, _) => Instr::MulC { dst, weight: at(0), closure: at(1) },
             ExprKind::Op(Op::Layer, _) => Instr::Layer { dst, top: at(0), base: at(1) },
             ExprKind::Op(op, ids) => {
-                let n = self.body.expr(ids[0]).ty.cells() as u8;
-                Instr::Op { op, n, width: expr.ty.cells() as u8, dst, args: [at(0), at(1), at(2)] }
+                let cells = |i: usize| self.body.expr(ids[i]).ty.cells();
+                let (n, width) = (cells(0), expr.ty.cells());
+                let (a, b) = (at(0), at(1));
+                match (op, n, width) {
+                    (Op::Splat, ..) => Instr::Splat { dst, a },
+                    (Op::AddF | Op::SubF | Op::MulF | Op::DivF, 3, 3) => Instr::Componentwise { op, dst, a, b },
+                    // Operands of every operation but these have one cell if the first has.
+                    _ if n == 1 && width == 1 && op.arity() < 3 => Instr::Scalar { op, dst, a, b },
+                    _ => Instr::Op { op, n: n as u8, width: width as u8, dst, args: [a, b, at(2)] },
+                }
             }
             ExprKind::Call(function, args) => {
                 let ids = self.body.args(args);
+                if let Some(instr) = self.noise(function, ids, &operands, expr.ty.cells(), dst) {
+                    self.code.push(instr);
+                    self.values.push(dst);
+                    return;
+                }
                 let start = self.args.len() as u32;
                 for (reg, id) in operands.iter().zip(ids) {
                     self.args.extend([*reg, self.body.expr(*id).ty.cells() as u32]);
@@ -376,27 +397,57 @@ impl<'a> Lower<'a> {
             }
             ExprKind::OptionIndex(options, _) => Instr::OptionIndex { options, dst, name: at(0) },
             ExprKind::Lobe(kind, args) => {
-                let start = self.args.len() as u32;
-                let mut values = Vec::new();
-                for (reg, id) in operands.iter().zip(self.body.args(args)) {
-                    let arg = self.body.expr(*id);
-                    for k in 0..arg.ty.cells() {
-                        self.args.push(reg + k as u32);
-                        values.push(match arg.kind {
-                            ExprKind::Const(cells) => Some(f32::from_bits(cells[k])),
-                            _ => None,
-                        });
-                    }
-                }
-                let site = self.sites.len() as u32;
-                self.site_of.insert(id.0, site);
-                self.sites.push(Site { kind, values, span: expr.span });
-                Instr::Lobe { kind, site, dst, args: start }
+                let site = self.site(id, kind, args, &operands);
+                Instr::Lobe { site, dst }
             }
             _ => return,
         };
         self.code.push(instr);
         self.values.push(dst);
+    }
+
+    /// A place that makes a lobe, with its parameter block.
+    fn site(&mut self, id: ExprId, kind: LobeKind, args: Args, operands: &[Reg]) -> u32 {
+        let (mut values, mut open) = (Vec::new(), Vec::new());
+        for (reg, id) in operands.iter().zip(self.body.args(args)) {
+            let arg = self.body.expr(*id);
+            for k in 0..arg.ty.cells() {
+                values.push(match arg.kind {
+                    ExprKind::Const(cells) => Some(f32::from_bits(cells[k])),
+                    _ => {
+                        open.push((values.len() as u32, reg + k as u32));
+                        None
+                    }
+                });
+            }
+        }
+        let site = self.sites.len() as u32;
+        self.site_of.insert(id.0, site);
+        let known = values.iter().map(|value| value.unwrap_or(0.0)).collect();
+        self.makers.push(Maker { kind, known, open });
+        self.sites.push(Site { kind, values, span: self.body.expr(id).span });
+        site
+    }
+
+    /// Noise whose kind is known.
+    fn noise(&mut self, function: u16, ids: &[ExprId], operands: &[Reg], width: usize, dst: Reg) -> Option<Instr> {
+        let Eval::Noise(kind, repeats) = BUILTINS[function as usize].eval else { return None };
+        let named = usize::from(kind.is_none());
+        let kind = match kind {
+            Some(kind) => kind,
+            None => match self.body.expr(*ids.first()?).kind {
+                ExprKind::Const(cells) => f32::from_bits(cells[0]) as usize,
+                _ => return None,
+            },
+        };
+        let args = self.args.len() as u32;
+        for (reg, id) in operands.iter().zip(ids).skip(named) {
+            self.args.extend((0..self.body.expr(*id).ty.cells() as u32).map(|k| reg + k));
+        }
+        let numbers = self.args.len() as u32 - args;
+        let periodic = repeats == Repeats::Periodic;
+        let dimensions = if periodic { numbers / 2 } else { numbers } as u8;
+        Some(Instr::Noise { kind: kind as u8, dimensions, periodic, width: width as u8, dst, args })
     }
 
     fn temporary(&mut self, ty: Ty) -> Reg {
@@ -413,7 +464,8 @@ impl<'a> Lower<'a> {
         if dst != src {
             self.code.push(match ty {
                 Ty::Closure => Instr::CopyC { dst, src },
-                ty => Instr::Copy { n: ty.cells() as u8, dst, src },
+                ty if ty.cells() == 1 => Instr::Copy1 { dst, src },
+                _ => Instr::Copy3 { dst, src },
             });
         }
     }

@@ -5,24 +5,19 @@ use super::body::{Cells, Op};
 
 /// The value of an operation that touches no closure; `n` is the number of components of its operands.
 pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
-    let float = |f: fn(f32, f32) -> f32| {
+    let float = || {
         let mut out = [0; 3];
         for k in 0..n {
-            out[k] = f(f32::from_bits(a[k]), f32::from_bits(b[k])).to_bits();
+            out[k] = arithmetic(op, f32::from_bits(a[k]), f32::from_bits(b[k])).to_bits();
         }
         out
     };
     let int = |f: fn(i32, i32) -> i32| [f(a[0] as i32, b[0] as i32) as u32, 0, 0];
     let truth = |t: bool| [u32::from(t), 0, 0];
-    let compare_f = |f: fn(&f32, &f32) -> bool| truth(f(&f32::from_bits(a[0]), &f32::from_bits(b[0])));
     let compare_i = |f: fn(&i32, &i32) -> bool| truth(f(&(a[0] as i32), &(b[0] as i32)));
     let equal = || (0..n).all(|k| f32::from_bits(a[k]) == f32::from_bits(b[k]));
     match op {
-        Op::NegF => float(|a, _| -a),
-        Op::AddF => float(|a, b| a + b),
-        Op::SubF => float(|a, b| a - b),
-        Op::MulF => float(|a, b| a * b),
-        Op::DivF => float(divide),
+        Op::NegF | Op::AddF | Op::SubF | Op::MulF | Op::DivF => float(),
         Op::NegI => int(|a, _| a.wrapping_neg()),
         Op::NotI => int(|a, _| i32::from(a == 0)),
         Op::BitNotI => int(|a, _| !a),
@@ -38,10 +33,7 @@ pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
         Op::ShrI => int(|a, b| a.wrapping_shr(b as u32)),
         Op::EqF => truth(equal()),
         Op::NeF => truth(!equal()),
-        Op::LtF => compare_f(f32::lt),
-        Op::LeF => compare_f(f32::le),
-        Op::GtF => compare_f(f32::gt),
-        Op::GeF => compare_f(f32::ge),
+        Op::LtF | Op::LeF | Op::GtF | Op::GeF => truth(compare(op, f32::from_bits(a[0]), f32::from_bits(b[0]))),
         Op::EqI => compare_i(i32::eq),
         Op::NeI => compare_i(i32::ne),
         Op::LtI => compare_i(i32::lt),
@@ -70,6 +62,53 @@ pub fn apply(op: Op, n: usize, a: Cells, b: Cells, c: Cells) -> Cells {
             }
         }
         Op::AddC | Op::MulC | Op::Layer => [0; 3],
+    }
+}
+
+#[inline(always)]
+fn arithmetic(op: Op, a: f32, b: f32) -> f32 {
+    match op {
+        Op::NegF => -a,
+        Op::AddF => a + b,
+        Op::SubF => a - b,
+        Op::MulF => a * b,
+        _ => divide(a, b),
+    }
+}
+
+#[inline(always)]
+fn compare(op: Op, a: f32, b: f32) -> bool {
+    match op {
+        Op::LtF => a < b,
+        Op::LeF => a <= b,
+        Op::GtF => a > b,
+        _ => a >= b,
+    }
+}
+
+/// [`apply`] where operands and result are one cell each: what is frequent is done on the spot.
+#[inline(always)]
+pub fn scalar(op: Op, a: u32, b: u32) -> u32 {
+    let (x, y) = (f32::from_bits(a), f32::from_bits(b));
+    match op {
+        Op::AddF => arithmetic(Op::AddF, x, y).to_bits(),
+        Op::SubF => arithmetic(Op::SubF, x, y).to_bits(),
+        Op::MulF => arithmetic(Op::MulF, x, y).to_bits(),
+        Op::LtF | Op::LeF | Op::GtF | Op::GeF => u32::from(compare(op, x, y)),
+        _ => apply(op, 1, [a, 0, 0], [b, 0, 0], [0; 3])[0],
+    }
+}
+
+/// [`apply`] for arithmetic on the components of triples.
+#[inline(always)]
+pub fn componentwise(op: Op, a: Cells, b: Cells) -> Cells {
+    let each = |op| std::array::from_fn(|k| arithmetic(op, f32::from_bits(a[k]), f32::from_bits(b[k])).to_bits());
+    // The operation is decided once, not per component.
+    match op {
+        Op::AddF => each(Op::AddF),
+        Op::SubF => each(Op::SubF),
+        Op::MulF => each(Op::MulF),
+        _ => apply(op, 3, a, b, [0; 3]),
     }
 }
 

@@ -1,23 +1,17 @@
-//! The register program that a specialised shader is, and its interpreter.
-//!
-//! In: a shading point. Out: a closure tree. Typical programs run without touching the heap. Closures are shared, so a
-//! few instructions can describe a tree of any size; going beyond the tree's budget is an error rather than a surprise
-//! further down.
+//! The register program that a specialised shader is. [`machine`](super::machine) runs it.
 
-use super::body::{Cells, GlobalVar, Op};
-use super::builtins::{BUILTINS, MAX_ARGS};
+use super::body::{GlobalVar, Op};
 use super::host::Host;
-use super::ops;
-use super::tasks::{Strings, Surroundings, Task};
+use super::kept::Kept;
+use super::tasks::Task;
 use super::types::Ty;
 use crate::Globals;
-use crate::closure::{ClosureTree, NodeId, TreeError};
+use crate::closure::{ClosureTree, TreeError};
 use crate::diag::Diagnostic;
 use crate::lobes::LobeKind;
 use crate::span::Span;
-use smallvec::SmallVec;
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Shading went beyond a budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +61,26 @@ pub(super) enum Instr {
         global: GlobalVar,
         dst: u32,
     },
+    /// An operation on one cell each that gives one.
+    Scalar {
+        op: Op,
+        dst: u32,
+        a: u32,
+        b: u32,
+    },
+    /// An operation on floats, component by component.
+    Componentwise {
+        op: Op,
+        dst: u32,
+        a: u32,
+        b: u32,
+    },
+    /// A float in every component.
+    Splat {
+        dst: u32,
+        a: u32,
+    },
+    /// Any operation.
     Op {
         op: Op,
         n: u8,
@@ -79,6 +93,15 @@ pub(super) enum Instr {
         function: u16,
         width: u8,
         count: u8,
+        dst: u32,
+        args: u32,
+    },
+    /// Noise of a kind that is known. `args` starts a list of registers: coordinates, then as many periods if it repeats.
+    Noise {
+        kind: u8,
+        dimensions: u8,
+        periodic: bool,
+        width: u8,
         dst: u32,
         args: u32,
     },
@@ -120,8 +143,11 @@ pub(super) enum Instr {
     },
     /// A loop starts a round.
     Round,
-    Copy {
-        n: u8,
+    Copy1 {
+        dst: u32,
+        src: u32,
+    },
+    Copy3 {
         dst: u32,
         src: u32,
     },
@@ -129,12 +155,10 @@ pub(super) enum Instr {
         dst: u32,
         src: u32,
     },
-    /// `args` starts a list of one register per slot.
+    /// By the entry of [`Program::makers`] for its site.
     Lobe {
-        kind: LobeKind,
         site: u32,
         dst: u32,
-        args: u32,
     },
     AddC {
         dst: u32,
@@ -172,21 +196,34 @@ pub(super) struct Call {
     pub outs: Vec<(Ty, u32)>,
 }
 
+/// How the lobe of a site is made.
+#[derive(Clone, Debug)]
+pub(super) struct Maker {
+    pub kind: LobeKind,
+    /// Its parameter block, zero where the value is not known before shading.
+    pub known: Vec<f32>,
+    /// The slots that are not known, and their registers.
+    pub open: Vec<(u32, u32)>,
+}
+
 /// A shader with its parameters fixed, ready to shade.
 #[derive(Clone, Debug)]
 pub struct Program {
     pub(super) code: Vec<Instr>,
     pub(super) args: Vec<u32>,
+    /// What every cell starts with.
     pub(super) image: Vec<u32>,
-    pub(super) registers: usize,
     pub(super) closures: usize,
     pub(super) ci: u32,
     pub(super) sites: Vec<Site>,
+    pub(super) makers: Vec<Maker>,
     pub(super) deeds: Vec<Call>,
     pub(super) layer_pairs: Vec<(u32, u32)>,
     pub(super) strings: Vec<String>,
     pub(super) globals: Vec<GlobalVar>,
     pub(super) constant: bool,
+    /// The tree of a constant program, once it has been shaded; `None` for programs that run at every point.
+    pub(super) kept: Option<OnceLock<Result<Arc<Kept>, ShadeError>>>,
     pub(super) host: Option<Arc<dyn Host>>,
     pub(super) iterations: u32,
     pub(super) removed: Vec<String>,
@@ -232,149 +269,25 @@ impl Program {
         self.code.is_empty()
     }
 
-    /// Makes `tree` the closure at a shading point.
+    /// Makes `tree` the closure at a shading point. A constant program runs once; from then on its tree is copied, and a
+    /// `tree` that it filled last time only has its directions brought up to date.
     ///
     /// # Errors
     /// The tree is larger, or loops run longer, than a budget allows; it is then black.
     pub fn shade(&self, globals: &Globals, tree: &mut ClosureTree) -> Result<(), ShadeError> {
-        tree.clear();
-        let mut cells: SmallVec<[u32; 512]> = SmallVec::from_slice(&self.image);
-        let mut rounds = self.iterations;
-        let mut strings = Strings::new(&self.strings);
-        cells.resize(self.registers, 0);
-        let mut closures: SmallVec<[NodeId; 32]> = SmallVec::from_elem(tree.zero(), self.closures);
-        let mut at = 0;
-        while let Some(instr) = self.code.get(at) {
-            at += 1;
-            match *instr {
-                Instr::Global { global, dst } => write(&mut cells, dst, global.ty().cells(), global.read(globals)),
-                Instr::Op { op, n, width, dst, args } => {
-                    let [a, b, c] = args.map(|reg| read(&cells, reg, 3));
-                    write(&mut cells, dst, width as usize, ops::apply(op, n as usize, a, b, c));
-                }
-                Instr::Call { function, width, count, dst, args } => {
-                    let value = self.call(&cells, function, width, count, args);
-                    write(&mut cells, dst, width as usize, value);
-                }
-                Instr::OptionIndex { options, dst, name } => {
-                    let name = strings.get(cells[name as usize]);
-                    // A name that is only known now and unknown to the lobe means its first option.
-                    let index = options.iter().position(|option| *option == name).unwrap_or(0);
-                    cells[dst as usize] = (index as f32).to_bits();
-                }
-                Instr::Element { .. } | Instr::ElementC { .. } | Instr::Store { .. } | Instr::StoreC { .. } => {
-                    indexed(*instr, &mut cells, &mut closures);
-                }
-                Instr::Do { deed } => {
-                    let host = self.host.as_deref();
-                    let mut around = Surroundings { strings: &mut strings, host, globals };
-                    self.deeds[deed as usize].run(&mut cells, &mut around);
-                }
-                Instr::Round => match rounds.checked_sub(1) {
-                    Some(left) => rounds = left,
-                    None => {
-                        tree.set_root(tree.zero());
-                        return Err(ShadeError::Iterations(self.iterations));
-                    }
-                },
-                Instr::Copy { n, dst, src } => {
-                    let value = read(&cells, src, n as usize);
-                    write(&mut cells, dst, n as usize, value);
-                }
-                Instr::CopyC { dst, src } => closures[dst as usize] = closures[src as usize],
-                Instr::Lobe { kind, site, dst, args } => {
-                    let slots = &self.args[args as usize..args as usize + kind.spec().slot_count()];
-                    let values: SmallVec<[f32; 32]> =
-                        slots.iter().map(|reg| f32::from_bits(cells[*reg as usize])).collect();
-                    closures[dst as usize] = tree.lobe(kind, site, &values);
-                }
-                Instr::AddC { dst, a, b } => {
-                    closures[dst as usize] = tree.add(closures[a as usize], closures[b as usize]);
-                }
-                Instr::MulC { dst, weight, closure } => {
-                    let weight = read(&cells, weight, 3).map(f32::from_bits);
-                    closures[dst as usize] = tree.mul(weight, closures[closure as usize]);
-                }
-                Instr::Layer { dst, top, base } => {
-                    closures[dst as usize] = tree.layer(closures[top as usize], closures[base as usize]);
-                }
-                Instr::Jump { to } => at = to as usize,
-                Instr::JumpIfZero { condition, to } => {
-                    if cells[condition as usize] == 0 {
-                        at = to as usize;
-                    }
-                }
-                Instr::JumpUnlessZero { condition, to } => {
-                    if cells[condition as usize] != 0 {
-                        at = to as usize;
-                    }
-                }
+        match self.kept() {
+            None => return self.run(globals, tree),
+            Some(Ok(kept)) => kept.give(globals, tree),
+            Some(Err(e)) => {
+                tree.clear();
+                return Err(*e);
             }
         }
-        tree.set_root(closures[self.ci as usize]);
-        tree.within_budget().inspect_err(|_| tree.set_root(tree.zero()))?;
         Ok(())
     }
 
-    fn call(&self, cells: &[u32], function: u16, width: u8, count: u8, args: u32) -> Cells {
-        let mut values = [[0; 3]; MAX_ARGS];
-        let pairs = self.args[args as usize..].chunks_exact(2).take(count as usize);
-        for (value, pair) in values.iter_mut().zip(pairs) {
-            *value = read(cells, pair[0], pair[1] as usize);
-        }
-        BUILTINS[function as usize].apply(width as usize, &values[..count as usize])
+    /// The tree of a constant program. The first call makes it, so that no shading point has to.
+    pub(crate) fn kept(&self) -> Option<&Result<Arc<Kept>, ShadeError>> {
+        Some(self.kept.as_ref()?.get_or_init(|| Kept::new(self).map(Arc::new)))
     }
-}
-
-impl Call {
-    fn run(&self, cells: &mut [u32], around: &mut Surroundings) {
-        let get = |(ty, reg): &(Ty, u32)| (*ty, read(cells, *reg, ty.cells()));
-        let args: SmallVec<[(Ty, Cells); 32]> = self.args.iter().map(get).collect();
-        let mut outs: SmallVec<[(Ty, Cells); 17]> = self.outs.iter().map(get).collect();
-        self.task.run(&args, around, &mut outs);
-        for ((ty, reg), (_, value)) in self.outs.iter().zip(outs) {
-            write(cells, *reg, ty.cells(), value);
-        }
-    }
-}
-
-/// Reads or writes one of several registers.
-fn indexed(instr: Instr, cells: &mut [u32], closures: &mut [NodeId]) {
-    match instr {
-        Instr::Element { width, dst, base, len, index } => {
-            let at = limited(cells[index as usize], len);
-            let value = read(cells, base + at * u32::from(width), width as usize);
-            write(cells, dst, width as usize, value);
-        }
-        Instr::ElementC { dst, base, len, index } => {
-            closures[dst as usize] = closures[(base + limited(cells[index as usize], len)) as usize];
-        }
-        Instr::Store { width, base, len, index, src } => {
-            let at = limited(cells[index as usize], len);
-            let value = read(cells, src, width as usize);
-            write(cells, base + at * u32::from(width), width as usize, value);
-        }
-        Instr::StoreC { base, len, index, src } => {
-            closures[(base + limited(cells[index as usize], len)) as usize] = closures[src as usize];
-        }
-        _ => {}
-    }
-}
-
-/// An index limited to what there is.
-fn limited(index: u32, len: u32) -> u32 {
-    (index as i32).clamp(0, len as i32 - 1) as u32
-}
-
-/// Up to `n` cells; what lies beyond the registers reads as zero.
-fn read(cells: &[u32], reg: u32, n: usize) -> Cells {
-    let mut out = [0; 3];
-    for (out, cell) in out.iter_mut().zip(cells.get(reg as usize..).unwrap_or(&[])).take(n) {
-        *out = *cell;
-    }
-    out
-}
-
-fn write(cells: &mut [u32], reg: u32, n: usize, value: Cells) {
-    cells[reg as usize..reg as usize + n].copy_from_slice(&value[..n]);
 }

@@ -206,7 +206,7 @@ impl CheckedShader {
         let answers = Answers::of(self.host.as_deref());
         let body = dead::remove(fold::fold_open(&self.body, &open, answers));
         let program = lower::lower(&body, &needs::needs(&body, answers), &layers::layers(&body), Vec::new());
-        Program { host: self.host.clone(), iterations: self.iterations, ..program }
+        Program { host: self.host.clone(), iterations: self.iterations, kept: None, ..program }
     }
 
     /// Included files; the first is file 1 of spans.

@@ -30,12 +30,12 @@ pub fn noise(kind: usize, at: &At, channel: u32) -> f32 {
         return 0.0;
     }
     let half = |x: f32| 0.5 + 0.5 * x;
-    match KINDS.get(kind).copied().unwrap_or("uperlin") {
-        "perlin" | "snoise" => perlin(at, channel),
-        "cell" => unit(hash(&at.cells(|x| x), at.n, channel)),
-        "hash" => unit(hash(&at.x.map(|x| (x + 0.0).to_bits()), at.n, channel)),
-        "simplex" => simplex(at, channel),
-        "usimplex" => half(simplex(at, channel)),
+    match kind {
+        2 | 3 => perlin(at, channel),
+        4 => unit(hash(&at.cells(|x| x), at.n, channel)),
+        5 => unit(hash(&at.x.map(|x| (x + 0.0).to_bits()), at.n, channel)),
+        6 => simplex(at, channel),
+        7 => half(simplex(at, channel)),
         _ => half(perlin(at, channel)),
     }
 }
@@ -52,23 +52,59 @@ impl At {
         // Through i64, so that far cells wrap round instead of piling up at the end.
         cell as i64 as u32
     }
+
+    /// The cells around coordinate `d`, and how far it lies above the lower one.
+    #[inline(always)]
+    fn around(&self, d: usize) -> ([u32; 2], f32) {
+        let x = self.x[d];
+        if self.period[d] >= 1.0 || x.abs() >= 2_147_483_648.0 {
+            let floor = x.floor();
+            return ([self.wrapped(floor, d), self.wrapped(floor + 1.0, d)], x - floor);
+        }
+        // `floor` is a call where the processor has no instruction for it; a conversion never is.
+        let whole = x as i32;
+        let below = i32::from(whole as f32 > x);
+        let cell = whole.wrapping_sub(below) as u32;
+        ([cell, cell.wrapping_add(1)], x - (whole as f32 - below as f32))
+    }
 }
 
 /// Mixes up to four words (Jenkins' one-at-a-time, with a final avalanche).
 #[inline(always)]
 fn hash(words: &[u32; 4], n: usize, channel: u32) -> u32 {
-    let mut h = 0x9e37_79b9u32.wrapping_mul(channel.wrapping_add(n as u32 * 8 + 1));
+    let mut h = seed(n, channel);
     for word in &words[..n] {
         h = h.wrapping_add(*word);
         h = h.wrapping_add(h << 10);
         h ^= h >> 6;
         h = h.wrapping_mul(0x85eb_ca6b);
     }
+    avalanche(h)
+}
+
+/// Lets every bit change about half of all bits (Wellons, lowbias32).
+#[inline(always)]
+fn avalanche(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x7feb_352d);
     h ^= h >> 15;
     h = h.wrapping_mul(0x846c_a68b);
     h ^ h >> 16
+}
+
+/// What coordinate `d` of a lattice point adds to its hash. A point's is the avalanche of the sum of these and of
+/// [`seed`]: one product per coordinate, not per corner, and corners hash side by side. (A sum, because an exclusive or
+/// gives mirrored cells the same hash.)
+#[inline(always)]
+fn share_of(cell: u32, d: usize) -> u32 {
+    const ODD: [u32; 4] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d, 0x27d4_eb2f];
+    cell.wrapping_mul(ODD[d])
+}
+
+/// Tells components of a triple and numbers of dimensions apart.
+#[inline(always)]
+fn seed(n: usize, channel: u32) -> u32 {
+    0x9e37_79b9u32.wrapping_mul(channel.wrapping_add(n as u32 * 8 + 1))
 }
 
 /// The hash of an int, for `hash()`.
@@ -81,28 +117,40 @@ fn unit(h: u32) -> f32 {
     (h >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// The dot product of a hashed gradient with an offset.
+/// `x`, negated if the top bit of `h` is set.
 #[inline(always)]
-fn gradient(h: u32, x: &[f32; 4], n: usize) -> f32 {
-    if n == 1 {
-        // Slopes ±1/8 to ±1.
-        let slope = (1 + (h & 7)) as f32 * 0.125;
-        return if h & 8 == 0 { slope * x[0] } else { -slope * x[0] };
-    }
-    if n == 2 {
-        // The eight compass points.
-        let turn = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][(h & 3) as usize];
-        let diagonal = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]][(h & 3) as usize];
-        let g = if h & 4 == 0 { turn } else { diagonal.map(|d: f32| d * std::f32::consts::FRAC_1_SQRT_2) };
-        return g[0] * x[0] + g[1] * x[1];
-    }
-    // Toward the middles of a cube's edges: all but one coordinate ±1.
-    let skip = (h % n as u32) as usize;
-    let signs = h / n as u32;
-    (0..n).filter(|d| *d != skip).map(|d| if signs >> d & 1 == 0 { x[d] } else { -x[d] }).sum()
+fn signed(x: f32, h: u32) -> f32 {
+    f32::from_bits(x.to_bits() ^ (h & 0x8000_0000))
 }
 
-/// What brings each dimension's gradient noise to ±1: one over the largest value any gradients give.
+/// The dot product of a hashed gradient with an offset. Choices are selections, not branches, so that corners can be
+/// worked out side by side.
+#[inline(always)]
+fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
+    let choose = |first: bool, a: f32, b: f32| if first { a } else { b };
+    let choice = h & 0xffff;
+    match N {
+        // Slopes ±1/8 to ±1.
+        1 => signed((1 + (h & 7)) as f32 * 0.125 * x, h),
+        // The eight compass points.
+        2 => {
+            let (a, b) = (signed(x, h), signed(y, h << 1));
+            let straight = choose(choice & 2 == 0, a, b);
+            choose(choice & 1 == 0, straight, (a + b) * std::f32::consts::FRAC_1_SQRT_2)
+        }
+        // Toward the middles of a cube's edges: all but one coordinate ±1.
+        3 => {
+            let (a, b) = (choose(choice < 21_845, y, x), choose(choice < 43_690, z, y));
+            signed(a, h) + signed(b, h << 1)
+        }
+        _ => {
+            let (a, b) = (choose(choice < 0x4000, y, x), choose(choice < 0x8000, z, y));
+            let c = choose(choice < 0xc000, w, z);
+            signed(a, h) + signed(b, h << 1) + signed(c, h << 2)
+        }
+    }
+}
+
 fn perlin(at: &At, channel: u32) -> f32 {
     // One body per dimension: its loops are of known length then, which is most of the speed.
     match at.n {
@@ -114,60 +162,70 @@ fn perlin(at: &At, channel: u32) -> f32 {
 }
 
 fn perlin_in<const N: usize>(at: &At, channel: u32) -> f32 {
-    let floor = at.x.map(f32::floor);
-    let offset: [f32; 4] = std::array::from_fn(|d| at.x[d] - floor[d]);
-    let fade = offset.map(|t| t * t * t * (t * (t * 6.0 - 15.0) + 10.0));
-    // The two cells, offsets and shares along each coordinate.
-    let mut cells = [[0u32; 2]; N];
-    let mut shares = [[0.0f32; 2]; N];
+    // Along each coordinate: what the two cells add to the hash, the offsets from them, the share of the upper one.
+    let (mut shares, mut offsets, mut fade) = ([[0u32; 2]; N], [[0.0f32; 2]; 4], [0.0f32; N]);
     for d in 0..N {
-        cells[d] = [at.wrapped(floor[d], d), at.wrapped(floor[d] + 1.0, d)];
-        shares[d] = [1.0 - fade[d], fade[d]];
+        let (cells, t) = at.around(d);
+        shares[d] = cells.map(|cell| share_of(cell, d));
+        offsets[d] = [t, t - 1.0];
+        fade[d] = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
     }
-    let mut sum = 0.0;
-    for corner in 0..1usize << N {
-        let (mut cell, mut toward) = ([0u32; 4], [0.0f32; 4]);
-        let mut share = 1.0;
-        for d in 0..N {
-            let step = corner >> d & 1;
-            cell[d] = cells[d][step];
-            toward[d] = offset[d] - step as f32;
-            share *= shares[d][step];
+    // Bit d of a corner's number is its step along coordinate d.
+    let seed = seed(N, channel);
+    let (mut hashes, mut values) = ([0u32; 16], [0.0f32; 16]);
+    for corner in 0..1 << N {
+        hashes[corner] = avalanche((0..N).fold(seed, |h, d| h.wrapping_add(shares[d][corner >> d & 1])));
+    }
+    for corner in 0..1 << N {
+        values[corner] = gradient::<N>(hashes[corner], std::array::from_fn(|d| offsets[d][corner >> d & 1]));
+    }
+    for d in (0..N).rev() {
+        for k in 0..1 << d {
+            values[k] += fade[d] * (values[k + (1 << d)] - values[k]);
         }
-        sum += share * gradient(hash(&cell, N, channel), &toward, N);
     }
-    // At the middle of a cell all corners' gradients may agree; the largest such sum is known per dimension.
+    // What brings it to ±1: at the middle of a cell all corners' gradients may agree.
     let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
-    (sum / largest).clamp(-1.0, 1.0)
+    (values[0] / largest).clamp(-1.0, 1.0)
 }
 
 fn simplex(at: &At, channel: u32) -> f32 {
-    let n = at.n;
-    let nf = n as f32;
+    match at.n {
+        1 => simplex_in::<1>(at, channel),
+        2 => simplex_in::<2>(at, channel),
+        3 => simplex_in::<3>(at, channel),
+        _ => simplex_in::<4>(at, channel),
+    }
+}
+
+fn simplex_in<const N: usize>(at: &At, channel: u32) -> f32 {
+    let nf = N as f32;
     // Skew to a grid of cubes whose simplices are regular; back again with `unskew`.
     let skew = ((nf + 1.0).sqrt() - 1.0) / nf;
     let unskew = (1.0 - 1.0 / (nf + 1.0).sqrt()) / nf;
-    let slant: f32 = at.x[..n].iter().sum::<f32>() * skew;
-    let cell: [f32; 4] = std::array::from_fn(|d| (at.x[d] + slant).floor());
-    let back: f32 = cell[..n].iter().sum::<f32>() * unskew;
-    let first: [f32; 4] = std::array::from_fn(|d| at.x[d] - (cell[d] - back));
+    let slant: f32 = at.x[..N].iter().sum::<f32>() * skew;
+    let cell: [f32; N] = std::array::from_fn(|d| (at.x[d] + slant).floor());
+    let back: f32 = cell.iter().sum::<f32>() * unskew;
+    let first: [f32; N] = std::array::from_fn(|d| at.x[d] - (cell[d] - back));
     // The corners of the simplex: from the cell's corner along the coordinates, the largest first.
-    let mut order: [usize; 4] = [0, 1, 2, 3];
-    order[..n].sort_by(|a, b| first[*b].total_cmp(&first[*a]));
-    let mut step = [0.0f32; 4];
+    let mut order: [usize; N] = std::array::from_fn(|d| d);
+    order.sort_by(|a, b| first[*b].total_cmp(&first[*a]));
+    let mut step = [0.0f32; N];
     let mut sum = 0.0;
-    for corner in 0..=n {
+    for corner in 0..=N {
         if corner > 0 {
             step[order[corner - 1]] = 1.0;
         }
-        let offset: [f32; 4] = std::array::from_fn(|d| first[d] - step[d] + corner as f32 * unskew);
-        let falloff = 0.5 - offset[..n].iter().map(|x| x * x).sum::<f32>();
+        let offset: [f32; 4] =
+            std::array::from_fn(|d| if d < N { first[d] - step[d] + corner as f32 * unskew } else { 0.0 });
+        let falloff = 0.5 - offset.iter().map(|x| x * x).sum::<f32>();
         if falloff > 0.0 {
-            let corner = std::array::from_fn(|d| at.wrapped(cell[d] + step[d], d));
-            sum += falloff.powi(4) * gradient(hash(&corner, n, channel), &offset, n);
+            let share = |d: usize| share_of(at.wrapped(cell[d] + step[d], d), d);
+            let h = (0..N).fold(seed(N, channel), |h, d| h.wrapping_add(share(d)));
+            sum += falloff.powi(4) * gradient::<N>(avalanche(h), offset);
         }
     }
-    let largest = [0.0231, 0.0143, 0.0137, 0.0159][n - 1];
+    let largest = [0.0231, 0.0143, 0.0137, 0.0159][N - 1];
     (sum / largest).clamp(-1.0, 1.0)
 }
 
@@ -234,6 +292,37 @@ mod tests {
                 apart += usize::from(noise(4, &at, 0) != noise(4, &at, 1));
             }
             assert!(apart > 490);
+        }
+    }
+
+    #[test]
+    fn lattice_hashes_are_even_and_neighbours_independent() {
+        // Sixteen classes of 4096 each over a block of cells, and pairs of neighbours along each coordinate.
+        let class = |x: u32, y: u32, z: u32| {
+            let h = [x, y, z].iter().enumerate().fold(seed(3, 0), |h, (d, cell)| h.wrapping_add(share_of(*cell, d)));
+            let h = avalanche(h);
+            (h >> 30 | (h & 3) << 2) as usize
+        };
+        let mut counts = [0u32; 16];
+        let mut pairs = [[0u32; 256]; 3];
+        let cells = (0..40u32).flat_map(|x| (0..40u32).flat_map(move |y| (0..40u32).map(move |z| [x, y, z])));
+        for cell in cells.map(|cell| cell.map(|c| c.wrapping_sub(20))) {
+            let here = class(cell[0], cell[1], cell[2]);
+            counts[here] += 1;
+            for (d, pairs) in pairs.iter_mut().enumerate() {
+                let mut next = cell;
+                next[d] = next[d].wrapping_add(1);
+                pairs[here * 16 + class(next[0], next[1], next[2])] += 1;
+            }
+        }
+        let chi2 = |counts: &[u32]| {
+            let expected = 64_000.0 / counts.len() as f64;
+            counts.iter().map(|n| (f64::from(*n) - expected).powi(2) / expected).sum::<f64>()
+        };
+        // The one in ten thousand quantiles for 15 and 255 degrees of freedom.
+        assert!(chi2(&counts) < 44.3, "{}", chi2(&counts));
+        for pairs in &pairs {
+            assert!(chi2(pairs) < 347.7, "{}", chi2(pairs));
         }
     }
 
