@@ -25,5 +25,31 @@ closure color microcylinder(normal N, vector T, color A1, float eta1, float kd1,
 closure color sheen(closure color base, normal N, color tint, float roughness) BUILTIN;
 // The bare sheen lobe: `sheen_bsdf(N, 1, roughness)`.
 closure color sheen(normal N, float roughness) BUILTIN;
+// `microfacet("ggx", N, 0, alpha, alpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_ggx(normal N, float alpha) BUILTIN;
+// `microfacet("beckmann", N, 0, alpha, alpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_beckmann(normal N, float alpha) BUILTIN;
+// `microfacet("ggx", N, 0, alpha, alpha, eta, 0)`, as early OSL calls it.
+closure color microfacet_ggx(normal N, float alpha, float eta) BUILTIN;
+// `microfacet("beckmann", N, 0, alpha, alpha, eta, 0)`, as early OSL calls it.
+closure color microfacet_beckmann(normal N, float alpha, float eta) BUILTIN;
+// `microfacet("ggx", N, T, xalpha, yalpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_ggx_aniso(normal N, vector T, float xalpha, float yalpha) BUILTIN;
+// `microfacet("beckmann", N, T, xalpha, yalpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_beckmann_aniso(normal N, vector T, float xalpha, float yalpha) BUILTIN;
+// `microfacet("ggx", N, 0, alpha, alpha, eta, 1)`, as Cycles calls it.
+closure color microfacet_ggx_refraction(normal N, float alpha, float eta) BUILTIN;
+// `microfacet("beckmann", N, 0, alpha, alpha, eta, 1)`, as Cycles calls it.
+closure color microfacet_beckmann_refraction(normal N, float alpha, float eta) BUILTIN;
+// `microfacet("multi_ggx", N, 0, alpha, alpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_multi_ggx(normal N, float alpha, color C) BUILTIN;
+// `microfacet("multi_ggx", N, T, xalpha, yalpha, 0, 0)`, as Cycles calls it.
+closure color microfacet_multi_ggx_aniso(normal N, vector T, float xalpha, float yalpha, color C) BUILTIN;
+// `microfacet("multi_ggx", N, 0, alpha, alpha, eta, 2)`, as Cycles calls it.
+closure color microfacet_multi_ggx_glass(normal N, float alpha, float eta, color C) BUILTIN;
+// `generalized_schlick_bsdf(N, T, 1, 0, xalpha, yalpha, f0, f90, 5, distribution)`, nearly as Cycles has it.
+closure color microfacet_aniso_fresnel(normal N, vector T, float xalpha, float yalpha, color f0, color f90, float eta, string distribution) BUILTIN;
+// `velvet(N, sigma)`, nearly as Cycles has it.
+closure color ashikhmin_velvet(normal N, float sigma) BUILTIN;
 
 #endif

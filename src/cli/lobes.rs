@@ -24,6 +24,9 @@ pub fn run(global: &Global, name: Option<&str>) -> Outcome {
         let _ = writeln!(text, "{}", form.signature());
         if name.is_some() {
             let _ = writeln!(text, "\n{}\nSource: {}", paragraph(form.doc), form.source);
+            if !form.note.is_empty() {
+                let _ = writeln!(text, "Note: {}", form.note);
+            }
             let _ = writeln!(text, "Reciprocal at its defaults: {}\n", if form.reciprocal { "yes" } else { "no" });
             for p in form.params {
                 let _ = writeln!(text, "  {} {}{}\n      {}", p.ty.name(), p.name, range(p), paragraph(p.doc));
@@ -41,20 +44,29 @@ pub fn run(global: &Global, name: Option<&str>) -> Outcome {
 /// Closures that stdosl.h declares itself, with these arguments.
 const STANDARD: &[&str] = &[
     "background",
+    "burley_diffuse_bsdf",
+    "conductor_bsdf",
     "debug",
+    "dielectric_bsdf",
     "diffuse",
     "emission",
+    "generalized_schlick_bsdf",
     "holdout",
     "layer",
     "microfacet",
     "oren_nayar",
+    "oren_nayar_diffuse_bsdf",
     "phong",
     "reflection",
     "refraction",
     "sheen_bsdf",
     "subsurface",
+    "subsurface_bssrdf",
     "translucent",
+    "translucent_bsdf",
     "transparent",
+    "transparent_bsdf",
+    "uniform_edf",
     "ward",
 ];
 
@@ -92,7 +104,7 @@ fn describe(form: &Form) -> Value {
         .collect();
     json!({
         "name": form.name, "signature": form.signature(), "params": params, "source": form.source,
-        "reciprocal": form.reciprocal, "doc": paragraph(form.doc),
+        "reciprocal": form.reciprocal, "doc": paragraph(form.doc), "note": form.note,
     })
 }
 

@@ -8,6 +8,7 @@ use super::functions::text;
 use super::host::{Answers, Host, Lookup, Speech, Subject};
 use super::types::Ty;
 use crate::globals::Globals;
+use crate::lobes::conductor;
 
 /// One of them. The arguments and results stand in the order of the comment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +53,8 @@ pub enum Task {
     Say(Speech),
     /// A basis, a place, and knots, as many as cells of the result each: the value there.
     Spline,
+    /// Reflectance and edge tint, colors: n and k of a metal, colors.
+    ArtisticIor,
     /// A value: whether it is known before shading.
     IsConstant,
     /// Object, name, what the result holds: whether it is known, and the value.
@@ -155,6 +158,11 @@ impl Task {
                 put(&mut out[1..], m.unwrap_or(matrix::IDENTITY));
             }
             Task::Spline => spline(args, around, out),
+            Task::ArtisticIor => {
+                let (n, k) = conductor::artistic_ior(triple(0), triple(1));
+                put_triple(out, n);
+                put_triple(&mut out[1..], k);
+            }
             Task::IsConstant => put_int(out, 0),
             Task::RayType | Task::IsConnected => {
                 let Surroundings { strings, host, globals } = around;

@@ -13,9 +13,9 @@
 //! same width, at weights below 1.5 near the peak.
 
 use super::interface::{Interface, index};
-use super::registry::{Build, ClosureParams, Form, LobeSpec, ParamSpec, SlotSource, closure};
+use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
-use super::{Lobe, LobeKind, Rgb};
+use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -46,33 +46,6 @@ closure! {
 }
 
 const SPEC: &LobeSpec = MicrofacetParams::SPEC;
-const ALPHA: ParamSpec = ParamSpec { name: "alpha", doc: "Width of the facets' slopes.", ..SPEC.params[3] };
-
-/// Cycles' names.
-pub(super) const FORMS: &[Form] = &[
-    Form {
-        name: "microfacet_ggx",
-        params: &[SPEC.params[1], ALPHA],
-        doc: "`microfacet(\"ggx\", N, 0, alpha, alpha, 0, 0)`, as Cycles calls it.",
-        source: SPEC.source,
-        reciprocal: true,
-        build: Build::Lobe { kind: LobeKind::Microfacet, args: &isotropic(&[0.0]) },
-    },
-    Form {
-        name: "microfacet_beckmann",
-        params: &[SPEC.params[1], ALPHA],
-        doc: "`microfacet(\"beckmann\", N, 0, alpha, alpha, 0, 0)`, as Cycles calls it.",
-        source: SPEC.source,
-        reciprocal: true,
-        build: Build::Lobe { kind: LobeKind::Microfacet, args: &isotropic(&[1.0]) },
-    },
-];
-
-const fn isotropic(distribution: &'static [f32]) -> [SlotSource; 7] {
-    use SlotSource::{Const, Param};
-    [Const(distribution), Param(0), Const(&[0.0; 3]), Param(1), Param(1), Const(&[0.0]), Const(&[0.0])]
-}
-
 /// See [`MicrofacetParams`].
 #[derive(Clone, Copy, Debug)]
 pub enum Microfacet<S> {

@@ -7,7 +7,9 @@
 pub mod charlie;
 pub mod ltc;
 pub mod registry;
+pub mod tags;
 
+mod aliases;
 mod charlie_terms;
 mod cloth;
 mod cloth_range;
@@ -341,12 +343,13 @@ const LAYER: Form = Form {
     source: "Conty & Kulla 2017, §5, after Kelemen & Szirmay-Kalos 2001",
     reciprocal: true,
     build: Build::Layer,
+    note: "",
 };
 
 /// Every way to call a closure: each lobe under its own name, then wrappers and aliases. Several forms may share a
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    let lists = [sheen::FORMS, microfacet::FORMS, specular::FORMS];
+    let lists = [sheen::FORMS, specular::FORMS, aliases::FORMS];
     lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

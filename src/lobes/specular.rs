@@ -44,6 +44,7 @@ pub(super) const FORMS: &[Form] = &[Form {
     source: "OSL specification, reflection()",
     reciprocal: true,
     build: Build::Lobe { kind: LobeKind::Reflection, args: &[SlotSource::Param(0), SlotSource::Const(&[0.0])] },
+    note: "",
 }];
 
 /// What a smooth dielectric reflects from the side `w` is on.
