@@ -10,9 +10,11 @@ use crate::closure::balance::Construction;
 use crate::closure::{Balance, Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
 use crate::diag::{Diagnostic, render_all};
 use crate::ir::{self, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
-use crate::lobes;
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
+use crate::lobes::registry::ClosureParams;
 use crate::lobes::registry::Form;
+use crate::lobes::subsurface::{self, SubsurfaceParams};
+use crate::lobes::{self, LobeKind};
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use crate::syntax::{Includes, Limits, Options};
@@ -116,6 +118,17 @@ impl Engine {
         let kind = HostKind::register(spec, Box::new(lobe), taken)?;
         let hosts = self.hosts.iter().copied().chain([kind.form()]).collect();
         Ok(Engine { hosts, ..self })
+    }
+
+    /// Takes over what scripts ask to be scattered below the surface: `subsurface_bssrdf`, `subsurface` and `bssrdf` become
+    /// this lobe, in place of a diffuse one of the same albedo. Its values are N, albedo, radius (a color), anisotropy and
+    /// the index of refraction, as `overcoat lobes subsurface_bssrdf` lists them; f is what it makes of them at a point.
+    /// A renderer that walks through the object itself needs none: it reads [`Bsdf::subsurface`].
+    pub fn subsurface(self, lobe: impl HostLobe + 'static) -> Self {
+        let kind = HostKind::in_place_of(SubsurfaceParams::SPEC, Box::new(lobe));
+        let forms = std::iter::once(kind.form()).chain(subsurface::forms(LobeKind::Host(kind), ""));
+        let hosts = forms.chain(self.hosts.iter().copied()).collect();
+        Engine { hosts, ..self }
     }
 
     /// Sets the budgets of scripts.

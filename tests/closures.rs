@@ -2,12 +2,15 @@
 //! is not there says so.
 
 use overcoat::closure::{ClosureTree, Node, NodeId};
+use overcoat::engine::Tier;
 use overcoat::lobes::forms;
+use overcoat::lobes::host::HostLobe;
 use overcoat::lobes::registry::ParamTy;
+use overcoat::lobes::signals::SignalKind;
 use overcoat::{Engine, Globals, Material, Shader};
 
 fn compile(script: &str) -> Shader {
-    match Engine::new().compile("test", script) {
+    match Engine::new().tier(Tier::Fast).compile("test", script) {
         Ok(shader) => shader,
         Err(e) => panic!("{script}\n{}", e.render(false)),
     }
@@ -146,5 +149,85 @@ fn artists_choose_metals_by_color() {
     let seen = m.shade(&Globals::default(), glam::Vec3::Z).expect("shades").albedo();
     for (seen, asked) in seen.into_iter().zip([0.9, 0.5, 0.3]) {
         assert!((seen - asked).abs() < 2e-3, "{seen} for {asked}");
+    }
+}
+
+fn shaded(script: &str) -> (Material, Globals) {
+    (material(script), Globals::default())
+}
+
+#[test]
+fn signals_reach_the_host_and_scatter_nothing() {
+    let (m, globals) = shaded(
+        "Ci = 0.5 * holdout() + color(0.1, 0.2, 0.3) * debug(\"wear\") + 0.25 * debug(\"wear\") + 2 * background() \
+         + layer(0.25 * diffuse(N), debug(\"below\"));",
+    );
+    let bsdf = m.shade(&globals, glam::Vec3::Z).expect("shades");
+    let value = |kind: SignalKind| bsdf.signals().iter().find(|s| s.kind == kind).map(|s| s.value);
+    assert_eq!(value(SignalKind::Holdout), Some([0.5; 3]));
+    assert_eq!(value(SignalKind::Background), Some([2.0; 3]));
+    let wear = value(SignalKind::Debug("wear")).expect("there");
+    assert!(wear.iter().zip([0.35, 0.45, 0.55]).all(|(a, b)| (a - b).abs() < 1e-6), "{wear:?}");
+    assert_eq!(value(SignalKind::Debug("below")), Some([0.75; 3]), "a layer dims what lies below");
+    assert_eq!(bsdf.signals().len(), 4);
+    assert!((bsdf.albedo()[0] - 0.25).abs() < 1e-6 && bsdf.emission() == [0.0; 3]);
+    assert_eq!(bsdf.lobe_count(), 1);
+}
+
+#[test]
+fn tags_may_be_known_only_when_shading() {
+    let shader = compile("string s = u > 0.5 ? \"right\" : concat(\"le\", \"ft\"); Ci = debug(s);");
+    let m = shader.material(&[]).expect("sets");
+    for (u, name) in [(0.2, "left"), (0.8, "right")] {
+        let globals = Globals { u, ..Globals::default() };
+        let bsdf = m.shade(&globals, glam::Vec3::Z).expect("shades");
+        assert_eq!(bsdf.signals()[0].kind, SignalKind::Debug(name));
+    }
+}
+
+#[test]
+fn what_is_scattered_below_is_diffuse_and_says_so() {
+    let script = "Ci = subsurface_bssrdf(N, color(0.9, 0.5, 0.3), color(1, 0.2, 0.1), 0.5);";
+    assert_eq!(compile(script).warnings()[0].code, "W0507");
+    let (m, globals) = shaded(script);
+    let bsdf = m.shade(&globals, glam::Vec3::Z).expect("shades");
+    let part = bsdf.subsurface().next().expect("one");
+    assert_eq!((part.albedo, part.radius, part.anisotropy), ([0.9, 0.5, 0.3], [1.0, 0.2, 0.1], 0.5));
+    let wi = [0.6, 0.0, 0.8];
+    let plain = material("Ci = color(0.9, 0.5, 0.3) * diffuse(N);");
+    assert_eq!(bsdf.eval(wi), plain.shade(&globals, glam::Vec3::Z).expect("shades").eval(wi));
+    assert!(bsdf.sample([0.2, 0.3, 0.4]).expect("a direction").flags.subsurface);
+    assert_eq!(
+        meaning("subsurface(1.3, 0.5, color(1, 2, 3), 0.7)"),
+        meaning("subsurface_bssrdf(N, 0.7, color(1, 2, 3), 0.5, \"ior\", 1.3)")
+    );
+    assert_eq!(
+        meaning("bssrdf(\"random_walk\", N, vector(1, 2, 3), 0.7)"),
+        meaning("subsurface_bssrdf(N, 0.7, color(1, 2, 3), 0)")
+    );
+}
+
+/// Half of what is asked for, evenly.
+struct Half;
+
+impl HostLobe for Half {
+    fn f(&self, values: &[f32], wo: [f64; 3], wi: [f64; 3]) -> [f64; 3] {
+        let lit = wo[2] > 0.0 && wi[2] > 0.0;
+        [3, 4, 5].map(|c| if lit { 0.5 * f64::from(values[c]) / std::f64::consts::PI } else { 0.0 })
+    }
+    fn albedo_bound(&self, values: &[f32], w: [f64; 3]) -> [f64; 3] {
+        [3, 4, 5].map(|c| if w[2] > 0.0 { 0.5 * f64::from(values[c]) } else { 0.0 })
+    }
+}
+
+#[test]
+fn a_host_takes_scattering_below_over() {
+    let engine = Engine::new().subsurface(Half);
+    for closure in ["subsurface_bssrdf(N, 0.8, 1, 0)", "subsurface(1.4, 0, 1, 0.8)", "bssrdf(\"a\", N, 1, 0.8)"] {
+        let shader = engine.compile("test", &format!("Ci = {closure};")).expect("compiles");
+        assert!(shader.warnings().is_empty());
+        let m = shader.material(&[]).expect("sets");
+        let albedo = m.shade(&Globals::default(), glam::Vec3::Z).expect("shades").albedo();
+        assert!((albedo[1] - 0.4).abs() < 1e-6, "{closure}: {albedo:?}");
     }
 }

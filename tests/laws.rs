@@ -31,9 +31,11 @@ fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Arc<Stack<S>> {
     shared.clone().downcast().expect("keyed by its type")
 }
 
-/// Every lobe with a spread of parameter blocks.
+/// Every lobe, or the one that OVERCOAT_LOBE names, with a spread of parameter blocks.
 fn instances() -> impl Iterator<Item = (LobeKind, Vec<f32>)> {
-    LobeKind::ALL.iter().flat_map(|k| blocks(*k).into_iter().map(move |b| (*k, b)))
+    let only = std::env::var("OVERCOAT_LOBE").ok();
+    let chosen = move |k: &&LobeKind| only.as_ref().is_none_or(|name| k.spec().name == name);
+    LobeKind::ALL.iter().filter(chosen).flat_map(|k| blocks(*k).into_iter().map(move |b| (*k, b)))
 }
 
 #[test]

@@ -67,6 +67,110 @@ fn glass_divides_all_light_between_reflection_and_refraction() {
 }
 
 #[test]
+fn thin_walls_divide_all_light() {
+    let mut worst = (1.0f64, 1.0f64);
+    for (k, (alpha, ior)) in
+        [((1e-4, 1e-4), 1.5), ((0.1, 0.1), 1.5), ((0.05, 0.4), 1.33), ((1.0, 1.0), 2.4)].into_iter().enumerate()
+    {
+        let shape = (k % 2) as f32;
+        let set = [
+            ("roughness_x", alpha.0),
+            ("roughness_y", alpha.1),
+            ("ior", ior),
+            ("thin_walled", 1.0),
+            ("distribution", shape),
+        ];
+        let stack = single::<f64>(LobeKind::Dielectric, &set);
+        for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -1.0] {
+            for side in [Side::View, Side::Light] {
+                let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
+                worst = (worst.0.min(e.max()), worst.1.max(e.max()));
+                assert!((0.999..1.0001).contains(&e.max()), "α {alpha:?} ior {ior} {side:?} cos {cos}: {e:?}");
+            }
+        }
+    }
+    println!("thin walls scatter {:.5} to {:.6}", worst.0, worst.1);
+}
+
+#[test]
+fn a_colored_boundary_divides_all_light() {
+    let mut worst = (1.0f64, 1.0f64);
+    for (k, (alpha, f0, f90, exponent)) in
+        [(1e-4, 0.04, 1.0, 5.0), (0.1, 0.04, 1.0, 5.0), (0.4, 0.2, 0.6, 2.0), (1.0, 0.04, 1.0, 5.0)]
+            .into_iter()
+            .enumerate()
+    {
+        let set = [
+            ("roughness_x", alpha),
+            ("roughness_y", alpha),
+            ("f0", f0),
+            ("f90", f90),
+            ("exponent", exponent),
+            ("transmission_tint", 1.0),
+            ("distribution", (k % 2) as f32),
+        ];
+        let stack = single::<f64>(LobeKind::GeneralizedSchlick, &set);
+        for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
+            for side in [Side::View, Side::Light] {
+                let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
+                worst = (worst.0.min(e.max()), worst.1.max(e.max()));
+                assert!((0.999..1.0001).contains(&e.max()), "α {alpha} f0 {f0} {side:?} cos {cos}: {e:?}");
+            }
+        }
+    }
+    println!("colored boundaries scatter {:.5} to {:.6}", worst.0, worst.1);
+}
+
+#[test]
+fn a_colored_boundary_reflects_one_color_and_passes_the_rest() {
+    let mut tree = ClosureTree::new();
+    let mut values = common::block(LobeKind::GeneralizedSchlick, |p| p.name.starts_with("roughness").then_some(1e-4));
+    let slot = |name: &str| LobeKind::GeneralizedSchlick.spec().slot_of(name).expect("there");
+    values[slot("transmission_tint")..][..3].fill(1.0);
+    values[slot("f0")..][..3].copy_from_slice(&[0.3, 0.1, 0.02]);
+    let root = tree.lobe(LobeKind::GeneralizedSchlick, 0, &values);
+    tree.set_root(root);
+    let stack = Stack::<f64>::new(tree, Precision::STANDARD);
+    for cos in [0.9f64, 0.4, -0.95] {
+        let bsdf = stack.bsdf(turned(cos).map(f64::from));
+        let mut rng = Pcg64Mcg::seed_from_u64(33);
+        let (mut back, mut on) = ([0.0; 3], [0.0; 3]);
+        let count = 20_000;
+        for _ in 0..count {
+            let Some(s) = bsdf.sample(rng.random()) else { continue };
+            let sum = if s.flags.transmit { &mut on } else { &mut back };
+            for c in 0..3 {
+                sum[c] += s.weight[c] / f64::from(count);
+            }
+        }
+        for (c, f0) in [0.3, 0.1, 0.02].into_iter().enumerate() {
+            // From inside the curve is that of the cosine outside.
+            let root: f64 = (0.42f64 / 3.0).sqrt();
+            let eta = (1.0 + root) / (1.0 - root);
+            let outside = if cos > 0.0 { cos } else { (1.0 - eta * eta * (1.0 - cos * cos)).sqrt() };
+            let f = f0 + (1.0 - f0) * (1.0 - outside).powi(5);
+            assert!((back[c] - f).abs() < 0.02 && (on[c] - (1.0 - f)).abs() < 0.02, "{cos}: {back:?} {on:?} for {f}");
+        }
+    }
+}
+
+#[test]
+fn a_smooth_thin_wall_is_a_window() {
+    for cos in [1.0f64, 0.5, 0.1, -0.7] {
+        let set = |tint| [("roughness_x", 1e-4), ("roughness_y", 1e-4), ("thin_walled", 1.0), tint];
+        let w = turned(cos).map(f64::from);
+        let back = single::<f64>(LobeKind::Dielectric, &set(("transmission_tint", 0.0))).bsdf(w).albedo()[0];
+        let on = single::<f64>(LobeKind::Dielectric, &set(("reflection_tint", 0.0)));
+        let r = fresnel::dielectric(1.25, cos.abs());
+        assert!((back - 2.0 * r / (1.0 + r)).abs() < 1e-3, "cos {cos}: {back} for {r}");
+        // Light goes through unbent, into the same medium.
+        let sample = on.bsdf(w).sample([0.3, 0.5, 0.5]).expect("a direction");
+        let near: f64 = (0..3).map(|c| (sample.wi[c] + w[c]).powi(2)).sum();
+        assert!(near.sqrt() < 3e-3 && sample.eta == 1.0 && sample.flags.transmit, "{sample:?}");
+    }
+}
+
+#[test]
 fn samples_carry_what_the_tables_say() {
     for shape in [0.0, 1.0] {
         for alpha in [1e-4, 0.02, 0.5] {
@@ -111,6 +215,7 @@ fn narrow_lobes_are_sampled_as_they_say() {
         (LobeKind::Microfacet, vec![("xalpha", 0.01), ("yalpha", 0.05), ("eta", 0.0)]),
         (LobeKind::Dielectric, vec![("roughness_x", 0.02), ("roughness_y", 0.02)]),
         (LobeKind::Dielectric, vec![("roughness_x", 0.6), ("roughness_y", 0.2), ("distribution", 1.0)]),
+        (LobeKind::Dielectric, vec![("roughness_x", 0.1), ("thin_walled", 1.0)]),
         (LobeKind::Conductor, vec![("roughness_x", 0.2)]),
     ] {
         let stack = single::<f32>(kind, &set);

@@ -19,6 +19,8 @@ closure color microcylinder_threads(normal N, vector T, color A1, float eta1, fl
 closure color velvet(normal N, float roughness) BUILTIN;
 // Rough diffuse reflection that loses no energy: what bounces between the facets is added back.
 closure color eon(normal N, color albedo, float roughness) BUILTIN;
+// Reflection by a metal's facets, the metal given by its colors.
+closure color metal(normal N, vector U, float roughness_x, float roughness_y, color reflectivity, color edge_tint, string distribution) BUILTIN;
 // Woven cloth of two families of dielectric threads, one along T, one across it, parameter by parameter.
 closure color microcylinder(normal N, vector T, color A1, float eta1, float kd1, float gamma_s1, float gamma_v1, float a1, float offset1, color A2, float eta2, float kd2, float gamma_s2, float gamma_v2, float a2, float offset2) BUILTIN;
 // Sheen layered over a closure: `layer(tint * sheen_bsdf(N, 1, roughness), base)`.
@@ -51,5 +53,7 @@ closure color microfacet_multi_ggx_glass(normal N, float alpha, float eta, color
 closure color microfacet_aniso_fresnel(normal N, vector T, float xalpha, float yalpha, color f0, color f90, float eta, string distribution) BUILTIN;
 // `velvet(N, sigma)`, nearly as Cycles has it.
 closure color ashikhmin_velvet(normal N, float sigma) BUILTIN;
+// `subsurface_bssrdf(N, albedo, radius, 0)`, as Cycles calls it.
+closure color bssrdf(string method, normal N, vector radius, color albedo) BUILTIN;
 
 #endif

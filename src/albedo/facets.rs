@@ -8,69 +8,13 @@
 //! μ^¼, and over the azimuth for a stretched surface or over α^¼ where α varies from point to point. There M is 0
 //! for a stretched surface: no simple function of the rows stays above its E.
 
+pub use super::facet::{Facet, FacetKey, FacetSpec, MAX_STRETCH, MIN_ALPHA, PARTS, white};
+
 use super::curve::{Precision, parallel};
 use super::quadrature::{Rule, adaptive};
-use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Real, Scalar, V3, fresnel};
+use crate::optics::microfacet::{Facets, mirror};
+use crate::optics::{Lift, Real, Scalar, V3};
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
-
-/// The narrowest surface, and the most one width may exceed the other.
-pub const MIN_ALPHA: f64 = 1e-4;
-/// See [`MIN_ALPHA`].
-pub const MAX_STRETCH: f64 = 64.0;
-/// Most components beside the total.
-pub const PARTS: usize = 3;
-/// What a reflectance depends on beside the cosine.
-pub type FacetKey = [f64; 8];
-
-/// What a facet does with light.
-#[derive(Clone, Copy, Debug)]
-pub enum Facet {
-    /// Reflects all. Beside the total the table holds what is reflected under these reflectances, at the cosine between
-    /// direction and facet.
-    Mirror {
-        /// The reflectances.
-        reflectance: fn(&FacetKey, f64) -> [f64; PARTS],
-        /// What it is given.
-        key: FacetKey,
-        /// How many of them are in use.
-        parts: usize,
-    },
-    /// Reflects or refracts; the table has two parts, reflected and refracted, and two sheets, above and below.
-    Dielectric {
-        /// Index below over index above.
-        eta: f64,
-    },
-}
-
-/// What to bake for a rough surface.
-#[derive(Clone, Copy, Debug)]
-pub struct FacetSpec {
-    /// The distribution of slopes.
-    pub shape: Shape,
-    /// Widths along x and y; `None` where they vary: then the table is over one α, and has no parts.
-    pub alpha: Option<[f64; 2]>,
-    /// What a facet does.
-    pub facet: Facet,
-}
-
-impl PartialEq for FacetSpec {
-    fn eq(&self, o: &Self) -> bool {
-        let facets = match (self.facet, o.facet) {
-            (Facet::Mirror { reflectance: f, key, parts }, Facet::Mirror { reflectance: g, key: k, parts: p }) => {
-                parts == p && (parts == 0 || (std::ptr::fn_addr_eq(f, g) && key == k))
-            }
-            (Facet::Dielectric { eta }, Facet::Dielectric { eta: e }) => eta == e,
-            _ => false,
-        };
-        facets && self.shape == o.shape && self.alpha == o.alpha
-    }
-}
-
-/// For [`Facet::Mirror`]: no reflectance.
-pub fn white(_: &FacetKey, _: f64) -> [f64; PARTS] {
-    [1.0; PARTS]
-}
 
 /// What the rows of a table go over.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -303,10 +247,8 @@ impl FacetSpec {
             }
             Some(_) => (Rows::One, 1, precision.cos_nodes * 3 / 2),
         };
-        let (sheets, parts) = match self.facet {
-            Facet::Mirror { parts, .. } => (1, if self.alpha.is_some() { parts } else { 0 }),
-            Facet::Dielectric { .. } => (2, if self.alpha.is_some() { 2 } else { 0 }),
-        };
+        let (sheets, parts) = self.facet.size();
+        let parts = if self.alpha.is_some() { parts } else { 0 };
         let grid = Grid { spec: self, rule: FacetQuadrature::new(precision), rows, nodes };
         let plane = rows * nodes;
         let places: Vec<usize> = (0..sheets * plane).collect();
@@ -464,11 +406,9 @@ impl FacetQuadrature {
     pub fn albedos(&self, spec: &FacetSpec, alpha: [f64; 2], w: V3<f64>) -> [(f64, f64); PARTS + 1] {
         let facets = Facets::new(spec.shape, alpha);
         let wo = V3::new(w.x, w.y, w.z.abs());
-        let facet = match spec.facet {
-            Facet::Dielectric { eta } if w.z < 0.0 => Facet::Dielectric { eta: 1.0 / eta },
-            facet => facet,
-        };
-        let seen = Seen { facets: &facets, facet, wo, reach: facets.reach(wo), proposal: facets.proposal().reach(wo) };
+        let (facet, below) = (spec.facet, w.z < 0.0);
+        let (reach, proposal) = (facets.reach(wo), facets.proposal().reach(wo));
+        let seen = Seen { facets: &facets, facet, beyond: facet.beyond(below), below, wo, reach, proposal };
         // About the azimuth of ωo as the stretched surface sees it. Half the circle will do where the other half is its
         // mirror image.
         let start = (wo.y * alpha[1]).atan2(wo.x * alpha[0]);
@@ -481,7 +421,7 @@ impl FacetQuadrature {
                 *sum = (sum.0 + share * value, sum.1 + share * off);
             }
         }
-        sums
+        facet.total(sums)
     }
 
     /// The mean over half the azimuths, and how far off it may be; `azimuth` is graded toward the far end, where at grazing angles
@@ -545,6 +485,9 @@ fn changes<T: PartialEq>(of: impl Fn(f64) -> T, steps: usize) -> Vec<(f64, T)> {
 struct Seen<'f> {
     facets: &'f Facets<f64>,
     facet: Facet,
+    /// See [`Facet::beyond`].
+    beyond: Option<f64>,
+    below: bool,
     wo: V3<f64>,
     reach: f64,
     proposal: f64,
@@ -555,13 +498,10 @@ impl Seen<'_> {
     fn directions(&self, h: V3<f64>) -> (f64, V3<f64>, Option<V3<f64>>) {
         let h = h.scale(1.0 / h.length_squared().sqrt().max(1e-300));
         let c = self.wo.dot(h).max(0.0);
-        let refracted = match self.facet {
-            Facet::Mirror { .. } => None,
-            Facet::Dielectric { eta } => {
-                let cos2 = 1.0 - (1.0 - c * c) / (eta * eta);
-                (cos2 > 0.0).then(|| h.scale(c / eta - cos2.sqrt()) - self.wo.scale(1.0 / eta))
-            }
-        };
+        let refracted = self.beyond.and_then(|eta| {
+            let cos2 = 1.0 - (1.0 - c * c) / (eta * eta);
+            (cos2 > 0.0).then(|| h.scale(c / eta - cos2.sqrt()) - self.wo.scale(1.0 / eta))
+        });
         (c, mirror(self.wo, h), refracted)
     }
 
@@ -580,17 +520,11 @@ impl Seen<'_> {
             ratio * cos * (self.wo.z + self.proposal) / shadowed.max(1e-300)
         };
         let reflected = if up.z > 0.0 { passed(up) } else { 0.0 };
-        match self.facet {
-            Facet::Mirror { reflectance, key, parts } => {
-                let part = if parts > 0 { reflectance(&key, c) } else { [0.0; PARTS] };
-                [reflected, reflected * part[0], reflected * part[1], reflected * part[2]]
-            }
-            Facet::Dielectric { eta } => {
-                let f = fresnel::dielectric((eta - 1.0) * (eta + 1.0), c);
-                let refracted = down.filter(|w| w.z < 0.0).map_or(0.0, passed);
-                let (r, t) = (f * reflected, (1.0 - f) * refracted);
-                [r + t, r, t, 0.0]
-            }
-        }
+        // Of the bent direction: its cosine with the facet, and what passes on.
+        let bent = down.zip(self.beyond).map(|(w, eta)| {
+            let cos = (1.0 - (1.0 - c * c) / (eta * eta)).max(0.0).sqrt();
+            (cos, if w.z < 0.0 { passed(w) } else { 0.0 })
+        });
+        self.facet.parts(self.below, (c, reflected), bent)
     }
 }

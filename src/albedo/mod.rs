@@ -5,6 +5,7 @@
 
 mod bends;
 pub mod curve;
+mod facet;
 pub mod facets;
 pub mod fibre;
 mod panels;

@@ -111,6 +111,7 @@ fn describe(form: &Form) -> Value {
 fn default(p: &ParamSpec) -> Value {
     match (p.ty, p.default) {
         (_, []) => Value::Null,
+        (ParamTy::String, _) if p.options.is_empty() => Value::Null,
         (ParamTy::String, [index]) => json!(p.options.get(*index as usize)),
         (ParamTy::Int, [x]) => json!(*x as i64),
         (_, [x]) => number(*x),
@@ -127,11 +128,11 @@ fn limit(p: &ParamSpec, x: f32) -> Value {
     }
 }
 
-fn range(p: &ParamSpec) -> String {
+pub(super) fn range(p: &ParamSpec) -> String {
     let mut text = String::new();
     if !p.options.is_empty() {
         let _ = write!(text, ", one of {}", p.options.join(", "));
-    } else if p.min.is_finite() || p.max.is_finite() {
+    } else if p.ty != ParamTy::String && (p.min.is_finite() || p.max.is_finite()) {
         let _ = write!(text, ", {} to {}", p.min, p.max);
     }
     if let (false, Value::String(s)) = (p.default.is_empty(), default(p)) {
@@ -143,6 +144,6 @@ fn range(p: &ParamSpec) -> String {
 }
 
 /// A doc comment as one paragraph.
-fn paragraph(doc: &str) -> String {
+pub(super) fn paragraph(doc: &str) -> String {
     doc.split_whitespace().collect::<Vec<_>>().join(" ")
 }

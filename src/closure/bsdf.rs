@@ -8,6 +8,7 @@ use super::flatten::Layering;
 use super::layer::{LayerStack, LayeringRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
+use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
 use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3};
 use smallvec::SmallVec;
@@ -39,6 +40,30 @@ pub struct Sample<S = f32> {
     pub eta: S,
 }
 
+/// Something a material tells the renderer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signal<S = f32> {
+    /// What it stands for.
+    pub kind: SignalKind,
+    /// Its weight, dimmed by the layers above it.
+    pub value: Rgb<S>,
+}
+
+/// Scattering below the surface that a material asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubsurfacePart<S = f32> {
+    /// What comes back of white light from all around, weights and layers toward ωo included.
+    pub albedo: Rgb<S>,
+    /// The shading normal, world space.
+    pub normal: [S; 3],
+    /// Mean free path per channel, in the scene's unit.
+    pub radius: [f32; 3],
+    /// Mean cosine of scattering, in [−1, 1].
+    pub anisotropy: f32,
+    /// Index of refraction of the medium.
+    pub ior: f32,
+}
+
 /// What kind of scattering a sample is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SampleFlags {
@@ -46,6 +71,8 @@ pub struct SampleFlags {
     pub transmit: bool,
     /// The direction comes from a delta lobe; `pdf` is a probability.
     pub delta: bool,
+    /// The direction comes from a diffuse lobe that stands in for scattering below the surface.
+    pub subsurface: bool,
 }
 
 /// One lobe of a flattened tree.
@@ -104,6 +131,7 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
+    pub(crate) signals: SmallVec<[Signal<S>; 8]>,
 }
 
 /// Which cosine multiplies f.
@@ -129,6 +157,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             layers: SmallVec::new(),
             frames: SmallVec::new(),
             emission: [S::zero(); 3],
+            signals: SmallVec::new(),
         }
     }
 
@@ -152,6 +181,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             l.probability = p;
         }
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
+        for s in &mut self.signals {
+            s.value = s.value.map(|v| v.min(S::c(1e30)));
+        }
     }
 
     /// f·|cos| and pdf of one direction.
@@ -220,14 +252,15 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let (local, _) = l.lobe.delta()?;
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
-            let flags = SampleFlags { transmit: transmit(wi), delta: true };
+            let flags = SampleFlags { transmit: transmit(wi), delta: true, ..SampleFlags::default() };
             let eta = S::one() / l.lobe.relative_eta(local);
             return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, eta);
         }
         let local = l.lobe.sample([u[0], u[1]]);
         let wi = frame.to_world(local);
         let eval = self.eval([wi.x, wi.y, wi.z]);
-        let flags = SampleFlags { transmit: transmit(wi), delta: false };
+        let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
+        let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };
         Self::sampled(wi, eval, flags, S::one() / l.lobe.relative_eta(local))
     }
 
@@ -258,6 +291,30 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Radiance given off toward ωo.
     pub fn emission(&self) -> Rgb<S> {
         self.emission
+    }
+
+    /// What the material tells the renderer beside light: `holdout`, `background` and `debug`, one entry per kind and name.
+    pub fn signals(&self) -> &[Signal<S>] {
+        &self.signals
+    }
+
+    pub(crate) fn signal(&mut self, kind: SignalKind, value: Rgb<S>) {
+        match self.signals.iter_mut().find(|s| s.kind == kind) {
+            Some(s) => s.value = std::array::from_fn(|c| s.value[c] + value[c]),
+            None => self.signals.push(Signal { kind, value }),
+        }
+    }
+
+    /// What is to be scattered below the surface, for a renderer that does so itself. The BSDF counts it as diffuse.
+    pub fn subsurface(&self) -> impl Iterator<Item = SubsurfacePart<S>> {
+        self.lobes.iter().filter_map(|l| match &l.lobe {
+            AnyLobe::Subsurface(lobe) => {
+                let (radius, anisotropy, ior) = lobe.medium();
+                let n = self.frames[l.frame as usize].n;
+                Some(SubsurfacePart { albedo: l.albedo, normal: [n.x, n.y, n.z], radius, anisotropy, ior })
+            }
+            _ => None,
+        })
     }
 
     /// Whether nothing is scattered at all.

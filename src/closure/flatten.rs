@@ -11,6 +11,7 @@ use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
+use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
 use crate::optics::{Scalar, V3, frame};
 use glam::Vec3;
@@ -204,6 +205,10 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             for c in 0..3 {
                 self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
             }
+            return;
+        }
+        if let Some(kind) = SignalKind::of(&lobe) {
+            self.bsdf.signal(kind, std::array::from_fn(|c| w.total[c] * scale[c]));
             return;
         }
         let albedo = lobe.albedo(wo, curve);

@@ -8,7 +8,7 @@ pub mod tree;
 mod walk;
 
 pub use balance::{Balance, Balancer, Fate, Unbalanced};
-pub use bsdf::{Bsdf, Eval, Sample, SampleFlags};
+pub use bsdf::{Bsdf, Eval, Sample, SampleFlags, Signal, SubsurfacePart};
 pub use flatten::{Curves, Layering, Tables, flatten};
 pub use layer::{LayeringRule, TintRule};
 pub use tree::{ClosureTree, Node, NodeId, Size, TreeError};

@@ -24,9 +24,9 @@ closure! {
         /// Width of the slopes across U.
         float roughness_y = 0.3, in (1e-4, 1.0);
         /// Index of refraction per channel (n).
-        color ior = [0.183, 0.421, 1.373], in (0.0, 20.0);
+        color ior = [0.183, 0.421, 1.373], in (0.0, 500.0);
         /// Extinction coefficient per channel (k).
-        color extinction = [3.424, 2.346, 1.77], in (0.0, 20.0);
+        color extinction = [3.424, 2.346, 1.77], in (0.0, 500.0);
         /// Distribution of the slopes; "default" and "multi_ggx" are "ggx".
         string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
     }

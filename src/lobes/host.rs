@@ -228,8 +228,16 @@ impl HostKind {
             source: spec.source.leak(),
             reciprocal: spec.reciprocal,
             class: LobeClass::Scatter,
+            note: "",
         };
         Ok(HostKind(Box::leak(Box::new(HostClosure { spec: spec_of, most: spec.most, lobe }))))
+    }
+
+    /// A closure with the signature of a built-in one.
+    pub(crate) fn in_place_of(spec: &'static LobeSpec, lobe: Box<dyn HostLobe>) -> HostKind {
+        let LobeSpec { name, params, doc, source, reciprocal, .. } = *spec;
+        let spec = LobeSpec { name, params, doc, source, reciprocal, class: LobeClass::Scatter, note: "" };
+        HostKind(Box::leak(Box::new(HostClosure { spec, most: 1.0, lobe })))
     }
 
     /// Its declaration.

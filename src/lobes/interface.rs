@@ -10,14 +10,17 @@
 //! Conty 2017). Either way across carries the same flux if (1 − x)·M̄ = (1 − x′)·η²·M̄′; we take
 //! T·min(M̄, η²·M̄′) for both, T = 4η/(1 + η)². Then reflection and refraction sum to E + M from both media.
 //!
+//! A reflectance of another shape than Fresnel's, per channel, is taken at the cosine outside, from either side; what is
+//! totally reflected stays so. Second bounces are then divided as by the plain surface of that index.
+//!
 //! Limit: such a surface is not stretched, two widths count as their geometric mean. Next to the edge of total reflection
 //! the albedo of a stretched one turns so fast with azimuth and cosine that no small table keeps it below 1.
 //!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
 use super::Rgb;
-use super::rough::even;
-use crate::albedo::facets::FacetTables;
+use super::rough::{Reflectance, even, largest, split};
+use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
 use std::f64::consts::FRAC_1_PI;
@@ -29,6 +32,10 @@ pub(super) fn index(eta: f32) -> f64 {
     if eta >= 1.0 { eta.max(1.01) } else { eta.min(0.99) }
 }
 
+fn mean<L: Real>(color: Rgb<L>) -> L {
+    (color[0] + color[1] + color[2]) * L::c(1.0 / 3.0)
+}
+
 /// A rough surface between two media, seen from one ωo. z > 0 is the outside.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface<S> {
@@ -36,6 +43,8 @@ pub struct Interface<S> {
     facets: Facets<S>,
     /// Index of the inside over that of the outside.
     eta: f64,
+    /// A reflectance per channel at the cosine outside; `None`: Fresnel's.
+    colored: Option<Reflectance<S>>,
     /// The far side's over that of ωo's side.
     far: S,
     /// +1 if ωo is outside, −1 inside.
@@ -56,11 +65,11 @@ pub struct Interface<S> {
 }
 
 impl<S: Real> Interface<S> {
-    /// `eta` as [`index`] gives it, the inside over the outside; tints for what is reflected and refracted.
+    /// `eta` as [`index`] gives it, the inside over the outside, and a reflectance if not Fresnel's; tints for what is reflected and refracted.
     pub(super) fn new(
         shape: Shape,
         alpha: [f32; 2],
-        eta: f64,
+        (eta, colored): (f64, Option<Reflectance<S>>),
         tints: [Rgb<f32>; 2],
         wo: V3<S>,
         tables: &FacetTables<S>,
@@ -80,7 +89,6 @@ impl<S: Real> Interface<S> {
         let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
         let missing = tables.missing(wo, alpha) * S::c(FRAC_1_PI);
         let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
-        let largest = |t: Rgb<S>| t[0].max(t[1]).max(t[2]);
         let odds = [largest(reflected), largest(refracted)];
         let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
         let even = S::c(1.0 / FRAC_1_PI) * missing * S::select((back + on).gt(S::zero()), S::one(), S::zero());
@@ -88,6 +96,7 @@ impl<S: Real> Interface<S> {
             wo,
             facets,
             eta,
+            colored,
             far: pick(S::c(eta), S::c(1.0 / eta)),
             side,
             reach: facets.reach(wo),
@@ -113,7 +122,7 @@ impl<S: Real> Interface<S> {
 
     /// Of refraction from ωo to ωi: h, the product of the cosines times n²/|h|⁴ (0 where no facet does it), 1 − F.
     #[inline(always)]
-    fn refraction<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L, L) {
+    fn refraction<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L, Rgb<L>) {
         let wo = V3::<L>::lift(self.wo);
         let outside = L::lift(self.side).gt(L::zero());
         let pick = |a: L, b: L| L::select(outside, a, b);
@@ -128,17 +137,24 @@ impl<S: Real> Interface<S> {
         let n2 = pick(L::c(self.eta * self.eta), L::one());
         let met = c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
         let jacobian = L::select(met, c_out * c_in * n2 / (length2 * length2), L::zero());
+        if let Some(law) = &self.colored {
+            // The cosine outside, and what it lacks of 1 from the sine: |out × h| is η·|out × in|.
+            let cos = c_out / length2.sqrt();
+            let sine2 = L::c(self.eta * self.eta) * out.cross(inn).length_squared() / length2;
+            let f = law.at(cos, sine2 / (L::one() + cos.max(L::zero())));
+            return (h, jacobian, f.map(|f| L::select(met, L::one() - f, L::zero())));
+        }
         // 1 − F from both cosines, in any unit: nothing cancels toward the critical angle.
         let eta = L::c(self.eta);
         let (s, p) = (eta.mul_add(c_in, c_out), eta.mul_add(c_out, c_in));
         let both = L::one() / s.sq().max(L::c(1e-12)) + L::one() / p.sq().max(L::c(1e-12));
         let passed = L::select(met, L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
-        (h, jacobian, passed)
+        (h, jacobian, [passed; 3])
     }
 
     /// F of the facet that mirrors ωo to ωi.
     #[inline(always)]
-    fn reflectance<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn reflectance<L: Real + Lift<S>>(&self, wi: V3<L>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let eta = self.eta;
         // In double precision, because toward the critical angle the sum for g² cancels.
@@ -148,7 +164,27 @@ impl<S: Real> Interface<S> {
             let c2 = 0.25 * ((v[0] + v[3]).powi(2) + (v[1] + v[4]).powi(2) + (v[2] + v[5]).powi(2)).min(4.0);
             [m, c2.sqrt(), c2 + m]
         });
-        fresnel::dielectric_at(m, c, g2)
+        let Some(law) = &self.colored else { return [fresnel::dielectric_at(m, c, g2); 3] };
+        // 1 − c² is the square of half the difference; bent, it grows by the index.
+        let outside = L::lift(self.side).gt(L::zero());
+        let fall = L::c(0.25) * (wo - wi).length_squared();
+        let bent = (g2.max(L::zero()) * L::c(eta * eta)).sqrt();
+        let cos = L::select(outside, c, bent);
+        let sine2 = L::select(outside, fall, fall * L::c(eta * eta));
+        let f = law.at(cos, sine2 / (L::one() + cos));
+        f.map(|f| L::select(g2.gt(L::zero()), f, L::one()))
+    }
+
+    /// [`Self::reflectance`] of a facet that ωo meets at the cosine `c`, all channels alike.
+    fn grey(&self, c: S) -> S {
+        let g2 = c.mul_add(c, (self.far - S::one()) * (self.far + S::one()));
+        let Some(law) = &self.colored else {
+            return fresnel::dielectric((self.far - S::one()) * (self.far + S::one()), c);
+        };
+        let outside = self.side.gt(S::zero());
+        let cos = S::select(outside, c, (g2.max(S::zero()) * S::c(self.eta * self.eta)).sqrt());
+        let f = mean(law.at(cos, S::one() - cos));
+        S::select(g2.gt(S::zero()), f, S::one())
     }
 
     #[inline(always)]
@@ -157,14 +193,15 @@ impl<S: Real> Interface<S> {
         let (same, other) = self.sides(wi);
         let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
         let h = wo + wi;
-        let back = self.reflectance(wi) * self.facets.d(h) * L::c(0.5) / shadowed;
+        let mirrored = self.facets.d(h) * L::c(0.5) / shadowed;
+        let reflectance = self.reflectance(wi);
         let (h, jacobian, passed) = self.refraction(wi);
-        let on = passed * jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
+        let bent = jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
         let missing = tables.missing(wi, self.facets.alpha());
         let [back_again, on_again] = self.again.map(|a| L::lift(a) * missing);
         std::array::from_fn(|c| {
-            let back = L::lift(self.reflected[c]) * (back + back_again);
-            let on = L::lift(self.refracted[c]) * (on + on_again);
+            let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);
+            let on = L::lift(self.refracted[c]) * passed[c].mul_add(bent, on_again);
             L::select(same, back, L::select(other, on, L::zero()))
         })
     }
@@ -182,10 +219,10 @@ impl<S: Real> Interface<S> {
         let (same, other) = self.sides(wi);
         let (cos_o, proposal) = (wo.z.abs(), L::lift(self.proposal));
         let h = wo + wi;
-        let back = self.chance(self.reflectance(wi)) * self.facets.mirrored_pdf(h, cos_o, proposal);
+        let back = self.chance(mean(self.reflectance(wi))) * self.facets.mirrored_pdf(h, cos_o, proposal);
         let (h, jacobian, passed) = self.refraction(wi);
         let density = L::c(4.0) * jacobian * self.facets.mirrored_pdf(h, cos_o, proposal);
-        let on = (L::one() - self.chance(L::one() - passed)) * density;
+        let on = (L::one() - self.chance(L::one() - mean(passed))) * density;
         let even = L::lift(self.even);
         let flat = even * sampling::cosine_hemisphere_pdf(wi.z.abs());
         let across = L::lift(self.across);
@@ -196,12 +233,6 @@ impl<S: Real> Interface<S> {
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
         let (zero, one) = (S::zero(), S::one());
-        // Each number that makes a choice is used again, stretched back to [0, 1).
-        let split = |u: S, p: S| {
-            let first = u.lt(p);
-            let (below, above) = (u / p.max(S::c(1e-6)), (u - p) / (one - p).max(S::c(1e-6)));
-            (first, S::select(first, below, above).clamp(zero, S::c(0.999_999_94)))
-        };
         let choose = |mask, a: V3<S>, b: V3<S>| {
             V3::new(S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z))
         };
@@ -216,8 +247,7 @@ impl<S: Real> Interface<S> {
         let (h, u1_left) = self.facet(wo, u[0], u1);
         let c = wo.dot(h).max(zero);
         let inv = one / self.far;
-        let f = fresnel::dielectric((self.far - one) * (self.far + one), c);
-        let reflects = u1_left.lt(self.chance(f));
+        let reflects = u1_left.lt(self.chance(self.grey(c)));
         let cos2 = one - (one - c * c) * inv * inv;
         let cos_t = cos2.safe_sqrt();
         let bent = h.scale(c.mul_add(inv, -cos_t)) - wo.scale(inv);
@@ -240,12 +270,11 @@ impl<S: Real> Interface<S> {
     pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
         let missing = tables.missing(w, self.facets.alpha());
         if tables.has_parts() {
-            let [back, on, _] = tables.view(w);
-            return self.total(w, missing, [back, on]);
+            return self.total(w, missing, self.sorted(tables.view(w)));
         }
         // As if it were smooth.
-        let back = fresnel::dielectric((self.far - S::one()) * (self.far + S::one()), w.z.abs());
-        self.total(w, missing, [back, S::one() - back].map(|part| part * (S::one() - missing)))
+        let back = self.grey(w.z.abs());
+        self.total(w, missing, [back, S::one() - back].map(|part| [part * (S::one() - missing); 3]))
     }
 
     /// Never below the albedo, from either side.
@@ -253,20 +282,25 @@ impl<S: Real> Interface<S> {
     pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
         let missing = tables.missing(w, self.facets.alpha());
         if tables.has_parts() {
-            let [back, on, _] = tables.bound(w);
-            return self.total(w, missing, [back, on]);
+            return self.total(w, missing, self.sorted(tables.bound(w)));
         }
         let largest = |c: usize| L::lift(self.reflected[c].max(self.refracted[c]));
         std::array::from_fn(|c| L::select(w.z.abs().gt(L::zero()), largest(c), L::zero()))
     }
 
+    /// Reflected and refracted parts per channel.
     #[inline(always)]
-    fn total<L: Real + Lift<S>>(&self, w: V3<L>, missing: L, [back, on]: [L; 2]) -> Rgb<L> {
+    fn sorted<L: Real>(&self, parts: [L; PARTS]) -> [Rgb<L>; 2] {
+        let [a, b, c, d, e, f] = parts;
+        if self.colored.is_some() { [[a, b, c], [d, e, f]] } else { [[a; 3], [b; 3]] }
+    }
+
+    #[inline(always)]
+    fn total<L: Real + Lift<S>>(&self, w: V3<L>, missing: L, [back, on]: [Rgb<L>; 2]) -> Rgb<L> {
         let near = (w.z * L::lift(self.side)).gt(L::zero());
         let crossing = L::select(near, L::lift(self.crossing[0]), L::lift(self.crossing[1]));
-        let back = missing.mul_add(L::one() - crossing, back);
-        let on = missing.mul_add(crossing, on);
         std::array::from_fn(|c| {
+            let (back, on) = (missing.mul_add(L::one() - crossing, back[c]), missing.mul_add(crossing, on[c]));
             let sum = L::lift(self.reflected[c]).mul_add(back, L::lift(self.refracted[c]) * on).min(L::one());
             L::select(w.z.abs().gt(L::zero()), sum, L::zero())
         })

@@ -92,7 +92,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         if two_media(params.eta, params.refract) {
             let on = |yes: bool| [f32::from(u8::from(yes)); 3];
             let tints = [on(params.refract != 1), on(params.refract != 0)];
-            Glass(Interface::new(shape, alpha, index(params.eta), tints, wo, curve.facets()))
+            Glass(Interface::new(shape, alpha, (index(params.eta), None), tints, wo, curve.facets()))
         } else {
             Mirror(Reflector::new(shape, alpha, Reflectance::White, wo, curve.facets()))
         }

@@ -10,6 +10,7 @@ pub mod registry;
 pub mod tags;
 
 mod aliases;
+pub mod burley;
 mod charlie_terms;
 mod cloth;
 mod cloth_range;
@@ -24,18 +25,25 @@ pub mod host;
 mod interface;
 pub mod limits;
 mod ltc_tables;
+pub mod metal;
 pub mod microcylinder;
 pub mod microcylinder_threads;
 pub mod microfacet;
 pub mod oren_nayar;
+pub mod oren_nayar_diffuse;
+mod pane;
+pub mod phong;
 mod rough;
 pub mod schlick;
 pub mod sheen;
+pub mod signals;
 pub mod specular;
+pub mod subsurface;
 pub mod thread;
 pub mod translucent;
 pub mod transparent;
 pub mod velvet;
+pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -297,6 +305,15 @@ lobes! {
     schlick::GeneralizedSchlick,
     specular::Reflection,
     specular::Refraction,
+    oren_nayar_diffuse::OrenNayarDiffuse,
+    burley::Burley,
+    metal::Metal,
+    phong::Phong,
+    ward::Ward,
+    subsurface::Subsurface,
+    signals::Holdout,
+    signals::Background,
+    signals::Debug,
 }
 
 impl LobeKind {
@@ -350,6 +367,6 @@ const LAYER: Form = Form {
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    let lists = [sheen::FORMS, specular::FORMS, aliases::FORMS];
+    let lists = [sheen::FORMS, specular::FORMS, aliases::FORMS, &subsurface::FORMS];
     lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

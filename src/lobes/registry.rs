@@ -118,6 +118,8 @@ pub struct LobeSpec {
     pub reciprocal: bool,
     /// How it takes part in a BSDF.
     pub class: LobeClass,
+    /// See [`Form::note`].
+    pub note: &'static str,
 }
 
 impl LobeSpec {
@@ -184,6 +186,8 @@ pub enum SlotSource {
     Param(usize),
     /// Fixed by the form.
     Const(&'static [f32]),
+    /// The shading point's normal.
+    Normal,
 }
 
 /// What calling a [`Form`] builds.
@@ -250,7 +254,7 @@ impl Form {
             source: spec.source,
             reciprocal: spec.reciprocal,
             build: Build::Lobe { kind, args: &[] },
-            note: "",
+            note: spec.note,
         }
     }
 
@@ -331,6 +335,7 @@ macro_rules! closure {
         source: $source:literal,
         reciprocal: $rec:literal,
         class: $class:ident,
+        $( note: $note:expr, )?
     ) => {
         $(#[doc = $doc])*
         #[derive(Clone, Copy, Debug)]
@@ -354,6 +359,7 @@ macro_rules! closure {
                 source: $source,
                 reciprocal: $rec,
                 class: $crate::lobes::registry::LobeClass::$class,
+                note: $crate::lobes::registry::or_else!($($note)?, ""),
             };
 
             #[allow(unused_assignments, unused_variables, unused_mut, non_snake_case)]

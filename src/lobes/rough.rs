@@ -8,7 +8,7 @@
 
 use super::Rgb;
 use super::registry::LobeSpec;
-use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA};
+use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
 use std::f64::consts::FRAC_1_PI;
@@ -42,6 +42,18 @@ pub(super) fn known_width(spec: &LobeSpec, first: usize, slot: usize, values: &[
 fn known(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f32; 2]> {
     let value = |k: usize| Some(spec.params[first + k].clamp(0, values[slot + k]?));
     Some([value(0)?, value(1)?])
+}
+
+/// Whether `u` in [0, 1) falls below `p`, and `u` stretched back to [0, 1) to be used again.
+pub(super) fn split<S: Real>(u: S, p: S) -> (S::Mask, S) {
+    let first = u.lt(p);
+    let (below, above) = (u / p.max(S::c(1e-6)), (u - p) / (S::one() - p).max(S::c(1e-6)));
+    (first, S::select(first, below, above).clamp(S::zero(), S::c(0.999_999_94)))
+}
+
+/// The largest channel.
+pub(super) fn largest<S: Real>(color: Rgb<S>) -> S {
+    color[0].max(color[1]).max(color[2])
 }
 
 /// What a facet reflects.
@@ -170,11 +182,7 @@ impl<S: Real> Reflector<S> {
     }
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
-        // The number that makes the choice is used again, stretched back to [0, 1).
-        let even = u[1].lt(self.even);
-        let below = u[1] / self.even.max(S::c(1e-6));
-        let above = (u[1] - self.even) / (S::one() - self.even).max(S::c(1e-6));
-        let again = S::select(even, below, above).clamp(S::zero(), S::c(0.999_999_94));
+        let (even, again) = split(u[1], self.even);
         let flat = sampling::cosine_hemisphere([again, u[0]]);
         let bright = mirror(self.wo, self.facets.visible(self.wo, [u[0], again]));
         V3::new(S::select(even, flat.x, bright.x), S::select(even, flat.y, bright.y), S::select(even, flat.z, bright.z))
@@ -192,7 +200,7 @@ impl<S: Real> Reflector<S> {
     }
 
     #[inline(always)]
-    fn total<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>, parts: Rgb<L>) -> Rgb<L> {
+    fn total<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>, parts: [L; PARTS]) -> Rgb<L> {
         let missing = tables.missing(w, self.facets.alpha());
         let white = matches!(self.reflectance, Reflectance::White);
         std::array::from_fn(|c| {

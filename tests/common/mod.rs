@@ -105,6 +105,9 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
             if p.ty == ParamTy::Float {
                 let (lo, hi) = (p.min.max(0.0), p.max.min(limit));
                 vec![lo, lo + (hi - lo) * 0.1, lo + (hi - lo) * 0.4, hi]
+            } else if p.ty == ParamTy::String && p.options.is_empty() {
+                // A name is as good as any other.
+                p.default.to_vec()
             } else {
                 (p.min as i32..=p.max as i32).map(|v| v as f32).collect()
             }
@@ -153,6 +156,10 @@ fn surfaces(kind: LobeKind) -> Vec<Vec<f32>> {
                 ParamTy::Float if is_width(p) => Some(if p.name.contains('x') { x } else { y }),
                 ParamTy::Float => Some(p.min.max(0.0) + (p.max.min(10.0) - p.min.max(0.0)) * t),
                 ParamTy::String => Some((k % 2) as f32),
+                // Black by default, so that no more than half of them transmit.
+                ParamTy::Color if kind == LobeKind::GeneralizedSchlick && p.name == "transmission_tint" => {
+                    Some((k % 2) as f32)
+                }
                 ParamTy::Int => Some((p.min + t * (p.max - p.min)).round()),
                 _ => None,
             }

@@ -30,7 +30,8 @@ impl<'a> Checker<'a> {
 
     /// Every way to call a closure.
     fn forms(&self) -> impl Iterator<Item = &'a Form> + use<'a> {
-        built_in().iter().chain(self.hosts)
+        // The host's first: what it takes over looks the same.
+        self.hosts.iter().chain(built_in())
     }
 
     pub(super) fn call(&mut self, name: Sym, at: Span, args: ast::Args, span: Span, wanted: Option<Ty>) -> Typed {

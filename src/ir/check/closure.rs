@@ -1,6 +1,6 @@
 //! Calls of closures, with their keyword arguments.
 
-use super::super::body::{ExprId, ExprKind, Op};
+use super::super::body::{ExprId, ExprKind, GlobalVar, Op};
 use super::super::types::Ty;
 use super::call::Given;
 use super::{Checker, Typed, suggest};
@@ -148,6 +148,7 @@ impl Checker<'_> {
             ids.push(match source {
                 SlotSource::Param(i) => self.value(form, values, *i, span),
                 SlotSource::Const(slots) => self.slots(slots, param.ty, span),
+                SlotSource::Normal => self.push(ExprKind::Global(GlobalVar::N), Ty::Normal, span).id,
             });
         }
         ids
