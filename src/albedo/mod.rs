@@ -7,8 +7,10 @@ mod bends;
 pub mod curve;
 pub mod facets;
 pub mod fibre;
+mod fill;
 mod panels;
 pub mod quadrature;
+mod visible;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
 pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
