@@ -10,11 +10,12 @@
 
 pub use super::facet::{Facet, FacetKey, FacetSpec, MAX_STRETCH, MIN_ALPHA, PARTS, white};
 
-use super::curve::{Precision, parallel};
-use super::quadrature::{Rule, adaptive};
-use crate::optics::microfacet::{Facets, mirror};
+use super::curve::Precision;
+use super::fill::{Estimate, fill};
+use super::quadrature::Rule;
+use super::visible::FacetQuadrature;
 use crate::optics::{Lift, Real, Scalar, V3};
-use std::f64::consts::{FRAC_2_PI, PI, TAU};
+use std::f64::consts::FRAC_2_PI;
 
 /// What the rows of a table go over.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -238,21 +239,25 @@ fn alpha_row<S: Real>(width: S) -> S {
 impl FacetSpec {
     /// Integrates at the nodes, then measures the interpolation between them and lowers M and lifts the bounds by it.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> FacetTables<S> {
+        // A power of two steps, as `fill` wants them.
+        let steps = |n: usize| 1usize << (n as f64).log2().round() as u32;
         let coarse = (precision.cos_nodes * 3 / 10).clamp(24, 96);
         let (kind, rows, nodes) = match self.alpha {
-            None => (Rows::Alpha, precision.axis_nodes.min(48), coarse),
+            None => (Rows::Alpha, steps(precision.axis_nodes.min(48)), coarse),
             Some([x, y]) if x != y => {
-                let rows = (precision.axis_nodes / 2).clamp(8, 32);
+                let rows = steps((precision.axis_nodes / 2).clamp(8, 32));
                 (Rows::Azimuth([S::c(x.sqrt()), S::c(y.sqrt())]), rows, coarse * 3 / 2)
             }
-            Some(_) => (Rows::One, 1, precision.cos_nodes * 3 / 2),
+            Some(_) => (Rows::One, 0, precision.cos_nodes * 3 / 2),
         };
+        let (rows, nodes) = (rows + 1, steps(nodes) + 1);
         let (sheets, parts) = self.facet.size();
         let parts = if self.alpha.is_some() { parts } else { 0 };
         let grid = Grid { spec: self, rule: FacetQuadrature::new(precision), rows, nodes };
         let plane = rows * nodes;
-        let places: Vec<usize> = (0..sheets * plane).collect();
-        let albedos = parallel(&places, |&k| grid.albedos(k / plane, (k % plane / nodes) as f64, (k % nodes) as f64));
+        let fine: Vec<Fine> = (0..sheets).map(|sheet| grid.fine(sheet, precision.margin)).collect();
+        let albedos: Vec<[Estimate; PARTS + 1]> =
+            (0..sheets * plane).map(|k| fine[k / plane].at(2 * (k % plane / nodes), 2 * (k % nodes))).collect();
         let parts_of = |part: usize| albedos.iter().map(move |a| S::c(a[part + 1].0));
         let view: Vec<S> = (0..parts).flat_map(parts_of).collect();
         let mut tables = FacetTables {
@@ -266,7 +271,7 @@ impl FacetSpec {
             nodes,
             parts,
         };
-        let lifts = grid.shortfalls(&tables);
+        let lifts = grid.shortfalls(&tables, &fine);
         for (k, lift) in lifts.iter().enumerate() {
             let missing = tables.missing[k].to_f64();
             // Not quite 0, so that between nodes single precision keeps its digits.
@@ -280,6 +285,19 @@ impl FacetSpec {
         }
         tables.means = grid.means(&tables);
         tables
+    }
+}
+
+/// Albedos over a table's nodes and half way between them.
+struct Fine {
+    values: Vec<[Estimate; PARTS + 1]>,
+    nodes: usize,
+}
+
+impl Fine {
+    /// In half steps.
+    fn at(&self, row: usize, node: usize) -> [Estimate; PARTS + 1] {
+        self.values[row * self.nodes + node]
     }
 }
 
@@ -309,27 +327,30 @@ impl Grid<'_> {
         (V3::new(sin * azimuth.cos(), sin * azimuth.sin(), if sheet == 0 { cos } else { -cos }), alpha)
     }
 
-    fn albedos(&self, sheet: usize, row: f64, node: f64) -> [(f64, f64); PARTS + 1] {
-        let (w, alpha) = self.at(sheet, row, node);
-        self.rule.albedos(self.spec, alpha, w)
+    /// The albedos at the nodes, at the middles of the cells and of their edges.
+    fn fine(&self, sheet: usize, tolerance: f64) -> Fine {
+        let (rows, nodes) = (2 * self.rows - 1, 2 * self.nodes - 1);
+        let values = fill(rows, nodes, tolerance, |row, node| {
+            let (w, alpha) = self.at(sheet, 0.5 * row as f64, 0.5 * node as f64);
+            self.rule.albedos(self.spec, alpha, w)
+        });
+        Fine { values, nodes }
     }
 
     /// By how much the truth between the nodes exceeds what is read there: a quarter more than the middles of cells and
     /// of their edges show. E is smooth, and off most in the middle.
-    fn shortfalls<S: Scalar>(&self, tables: &FacetTables<S>) -> Vec<[f64; PARTS + 1]> {
-        let mut probes: Vec<(usize, f64, f64)> = Vec::new();
+    fn shortfalls<S: Scalar>(&self, tables: &FacetTables<S>, fine: &[Fine]) -> Vec<[f64; PARTS + 1]> {
+        let mut probes: Vec<(usize, usize, usize)> = Vec::new();
         for sheet in 0..tables.sheets {
-            for half in 0..2 * self.rows - 1 {
-                let row = half as f64 / 2.0;
-                probes.extend((0..self.nodes - 1).map(|n| (sheet, row, n as f64 + 0.5)));
-                if half % 2 == 1 {
-                    probes.extend((0..self.nodes).map(|n| (sheet, row, n as f64)));
-                }
+            for row in 0..2 * self.rows - 1 {
+                // Where the row is one of the table's, only what lies between the nodes.
+                let nodes = (0..2 * self.nodes - 1).filter(|node| row % 2 == 1 || node % 2 == 1);
+                probes.extend(nodes.map(|node| (sheet, row, node)));
             }
         }
-        let missed = parallel(&probes, |&(sheet, row, node)| {
-            let (w, alpha) = self.at(sheet, row, node);
-            let truth = self.rule.albedos(self.spec, alpha, w);
+        let missed = probes.iter().map(|&(sheet, row, node)| {
+            let truth = fine[sheet].at(row, node);
+            let (w, alpha) = self.at(sheet, 0.5 * row as f64, 0.5 * node as f64);
             let (w, alpha) = (w.map(S::c), alpha.map(S::c));
             let read = tables.view(w);
             let mut missed = [truth[0].0 - (1.0 - tables.missing(w, alpha).to_f64()); PARTS + 1];
@@ -340,8 +361,8 @@ impl Grid<'_> {
         });
         let mut lifts = vec![[0.0f64; PARTS + 1]; tables.sheets * self.rows * self.nodes];
         for (&(sheet, row, node), missed) in probes.iter().zip(missed) {
-            for r in [row.floor() as usize, row.ceil() as usize] {
-                for n in [node.floor() as usize, node.ceil() as usize] {
+            for r in [row / 2, row.div_ceil(2)] {
+                for n in [node / 2, node.div_ceil(2)] {
                     let lift = &mut lifts[(sheet * self.rows + r) * self.nodes + n];
                     *lift = std::array::from_fn(|c| lift[c].max(1.25 * missed[c]));
                 }
@@ -381,150 +402,5 @@ impl Grid<'_> {
         }
         let sheet = |rows: &[f64]| S::c(rows.iter().zip(&over_azimuth).map(|(m, w)| m * w).sum());
         lines.chunks(self.rows).map(sheet).collect()
-    }
-}
-
-/// A rule over visible facets.
-pub struct FacetQuadrature {
-    along: Rule,
-    /// What each piece may be off by around the azimuth.
-    error: f64,
-}
-
-/// Where along a line the kind of facet is looked at.
-const STEPS: usize = 16;
-/// Most halvings of a piece around the azimuth.
-const HALVINGS: usize = 6;
-
-impl FacetQuadrature {
-    /// As fine as a precision asks for.
-    pub fn new(precision: Precision) -> Self {
-        FacetQuadrature { along: Rule::gauss_legendre(precision.polar), error: precision.margin }
-    }
-
-    /// E and its parts at `w`, whose z may be negative for a dielectric; and how far off they may be.
-    pub fn albedos(&self, spec: &FacetSpec, alpha: [f64; 2], w: V3<f64>) -> [(f64, f64); PARTS + 1] {
-        let facets = Facets::new(spec.shape, alpha);
-        let wo = V3::new(w.x, w.y, w.z.abs());
-        let (facet, below) = (spec.facet, w.z < 0.0);
-        let (reach, proposal) = (facets.reach(wo), facets.proposal().reach(wo));
-        let seen = Seen { facets: &facets, facet, beyond: facet.beyond(below), below, wo, reach, proposal };
-        // About the azimuth of ωo as the stretched surface sees it. Half the circle will do where the other half is its
-        // mirror image.
-        let start = (wo.y * alpha[1]).atan2(wo.x * alpha[0]);
-        let turns: &[f64] = if alpha[0] == alpha[1] { &[1.0] } else { &[1.0, -1.0] };
-        let mut sums = [(0.0, 0.0); PARTS + 1];
-        for turn in turns {
-            let halves = self.half(&seen, |v| (start + turn * PI * (1.0 - v * v)) / TAU);
-            for (sum, (value, off)) in sums.iter_mut().zip(halves) {
-                let share = 1.0 / turns.len() as f64;
-                *sum = (sum.0 + share * value, sum.1 + share * off);
-            }
-        }
-        facet.total(sums)
-    }
-
-    /// The mean over half the azimuths, and how far off it may be; `azimuth` is graded toward the far end, where at grazing angles
-    /// facets seen edge-on meet. Lines run from the facet that is seen best and are graded toward the steepest ones, among
-    /// which a narrow surface keeps everything that is not quite smooth.
-    fn half(&self, seen: &Seen<'_>, azimuth: impl Fn(f64) -> f64) -> [(f64, f64); PARTS + 1] {
-        let line = |v: f64| {
-            let u0 = azimuth(v);
-            move |s: f64| seen.facets.visible(seen.wo, [u0, 1.0 - (1.0 - s) * (1.0 - s)])
-        };
-        let kinds =
-            |v: f64| changes(|s| seen.kind(line(v)(s)), STEPS).into_iter().map(|piece| piece.1).collect::<Vec<_>>();
-        let ends = changes(kinds, 2 * STEPS);
-        let mut inner = |v: f64| {
-            let line = line(v);
-            let (mut sums, mut low) = ([0.0; PARTS + 1], 0.0);
-            for (edge, _) in changes(|s| seen.kind(line(s)), STEPS) {
-                for (s, weight) in self.along.between(low, edge) {
-                    let weight = weight * 2.0 * (1.0 - s) * 2.0 * v;
-                    for (sum, value) in sums.iter_mut().zip(seen.values(line(s))) {
-                        *sum += weight * value;
-                    }
-                }
-                low = edge;
-            }
-            sums
-        };
-        let (mut total, mut from) = ([(0.0, 0.0); PARTS + 1], 0.0);
-        for (to, _) in ends {
-            let piece = adaptive((from, to), self.error, HALVINGS, &mut inner);
-            total = std::array::from_fn(|i| (total[i].0 + piece[i].0, total[i].1 + piece[i].1));
-            from = to;
-        }
-        total
-    }
-}
-
-/// The pieces of [0, 1] on which a value stays the same, as far as steps of 1/`steps` show it: their ends, and the value.
-fn changes<T: PartialEq>(of: impl Fn(f64) -> T, steps: usize) -> Vec<(f64, T)> {
-    let mut pieces = Vec::new();
-    let (mut last, mut value) = (0.0, of(0.0));
-    for k in 1..=steps {
-        let next = k as f64 / steps as f64;
-        // A step may hold several changes.
-        while of(next) != value {
-            let (mut lo, mut hi) = (last, next);
-            for _ in 0..14 {
-                let middle = 0.5 * (lo + hi);
-                if of(middle) == value { lo = middle } else { hi = middle }
-            }
-            pieces.push((hi, std::mem::replace(&mut value, of(hi))));
-            last = hi;
-        }
-        last = next;
-    }
-    pieces.push((1.0, value));
-    pieces
-}
-
-/// A surface seen from one direction.
-struct Seen<'f> {
-    facets: &'f Facets<f64>,
-    facet: Facet,
-    /// See [`Facet::beyond`].
-    beyond: Option<f64>,
-    below: bool,
-    wo: V3<f64>,
-    reach: f64,
-    proposal: f64,
-}
-
-impl Seen<'_> {
-    /// Cosine of the facet, and the mirrored and the refracted direction; the last is `None` if totally reflected.
-    fn directions(&self, h: V3<f64>) -> (f64, V3<f64>, Option<V3<f64>>) {
-        let h = h.scale(1.0 / h.length_squared().sqrt().max(1e-300));
-        let c = self.wo.dot(h).max(0.0);
-        let refracted = self.beyond.and_then(|eta| {
-            let cos2 = 1.0 - (1.0 - c * c) / (eta * eta);
-            (cos2 > 0.0).then(|| h.scale(c / eta - cos2.sqrt()) - self.wo.scale(1.0 / eta))
-        });
-        (c, mirror(self.wo, h), refracted)
-    }
-
-    fn kind(&self, h: V3<f64>) -> (bool, Option<bool>) {
-        let (_, up, down) = self.directions(h);
-        (up.z > 0.0, down.map(|w| w.z < 0.0))
-    }
-
-    fn values(&self, h: V3<f64>) -> [f64; PARTS + 1] {
-        let (c, up, down) = self.directions(h);
-        let ratio = self.facets.d(h) / self.facets.proposal().d(h).max(1e-300);
-        // f·μ/pdf of the proposal, for light reflected and refracted alike.
-        let passed = |wi: V3<f64>| {
-            let cos = wi.z.abs();
-            let shadowed = cos * self.reach + self.wo.z * self.facets.reach(wi);
-            ratio * cos * (self.wo.z + self.proposal) / shadowed.max(1e-300)
-        };
-        let reflected = if up.z > 0.0 { passed(up) } else { 0.0 };
-        // Of the bent direction: its cosine with the facet, and what passes on.
-        let bent = down.zip(self.beyond).map(|(w, eta)| {
-            let cos = (1.0 - (1.0 - c * c) / (eta * eta)).max(0.0).sqrt();
-            (cos, if w.z < 0.0 { passed(w) } else { 0.0 })
-        });
-        self.facet.parts(self.below, (c, reflected), bent)
     }
 }

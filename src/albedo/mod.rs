@@ -8,8 +8,10 @@ pub mod curve;
 mod facet;
 pub mod facets;
 pub mod fibre;
+mod fill;
 mod panels;
 pub mod quadrature;
+mod visible;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
 pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};

@@ -258,10 +258,22 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
         let local = l.lobe.sample([u[0], u[1]]);
         let wi = frame.to_world(local);
-        let eval = self.eval([wi.x, wi.y, wi.z]);
         let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
         let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };
-        Self::sampled(wi, eval, flags, S::one() / l.lobe.relative_eta(local))
+        Self::sampled(wi, self.eval_own(wi, index)?, flags, S::one() / l.lobe.relative_eta(local))
+    }
+
+    /// [`eval`](Self::eval) of a direction that lobe `index` gave. `None` where that lobe's density is 0, as below a
+    /// horizon: another lobe may scatter there, but the sample is not one of its own.
+    fn eval_own(&self, wi: V3<S>, index: usize) -> Option<Eval<S>> {
+        let (mut pdf, mut own, mut at) = (S::zero(), S::zero(), 0);
+        let f_cos = self.sum(wi, Cosine::Light, |l, local| {
+            let part = l.lobe.pdf(local);
+            own = if at == index { part } else { own };
+            pdf = l.probability.mul_add(part, pdf);
+            at += 1;
+        });
+        (own > S::zero()).then_some(Eval { f_cos, pdf })
     }
 
     fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, eta: S) -> Option<Sample<S>> {

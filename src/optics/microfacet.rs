@@ -87,13 +87,23 @@ impl<S: Real> Facets<S> {
     /// visible facets of [`proposal`](Self::proposal); spherical caps, Dupuy & Benyoub 2023, listing 3.
     #[inline(always)]
     pub fn visible(&self, wo: V3<S>, u: [S; 2]) -> V3<S> {
+        self.seen_at(self.squeezed(wo), (u[0] * S::c(TAU)).sin_cos(), u[1])
+    }
+
+    /// Where `wo` points once the surface is squeezed until its facets cover a hemisphere.
+    #[inline(always)]
+    pub(crate) fn squeezed(&self, wo: V3<S>) -> V3<S> {
         let w = V3::new(wo.x * self.alpha[0], wo.y * self.alpha[1], wo.z);
-        let w = w.scale(S::one() / w.length_squared().sqrt().max(S::c(1e-18)));
-        let (sin, cos) = (u[0] * S::c(TAU)).sin_cos();
-        // z = 1 − u₁(1 + w.z); its sine without cancellation near 1.
-        let fall = u[1] * (S::one() + w.z);
+        w.scale(S::one() / w.length_squared().sqrt().max(S::c(1e-18)))
+    }
+
+    /// [`visible`](Self::visible) from a squeezed direction, for sine and cosine of the azimuth.
+    #[inline(always)]
+    pub(crate) fn seen_at(&self, w: V3<S>, (sin, cos): (S, S), u: S) -> V3<S> {
+        // z = 1 − u(1 + w.z); its sine without cancellation near 1.
+        let fall = u * (S::one() + w.z);
         let across = (fall * (S::c(2.0) - fall)).safe_sqrt();
-        let up = (S::one() - u[1]) * (S::one() + w.z);
+        let up = (S::one() - u) * (S::one() + w.z);
         V3::new(self.alpha[0] * across.mul_add(cos, w.x), self.alpha[1] * across.mul_add(sin, w.y), up)
     }
 
