@@ -22,9 +22,10 @@ use crate::closure::{
 };
 use crate::diag::Diagnostic;
 use crate::ir::{self, Batch, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
-use crate::lobes;
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
-use crate::lobes::registry::{Build, Form};
+use crate::lobes::registry::{Build, ClosureParams, Form};
+use crate::lobes::subsurface::{self, SubsurfaceParams};
+use crate::lobes::{self, LobeKind};
 use crate::optics::{Scalar, V3};
 use crate::span::Source;
 use crate::syntax::{Includes, Limits, Options};
@@ -140,6 +141,17 @@ impl Engine {
         Ok(Engine { hosts, ..self })
     }
 
+    /// Takes over what scripts ask to be scattered below the surface: `subsurface_bssrdf`, `subsurface` and `bssrdf` become
+    /// this lobe, in place of a diffuse one of the same albedo. Its values are N, albedo, radius (a color), anisotropy and
+    /// the index of refraction, as `overcoat lobes subsurface_bssrdf` lists them; f is what it makes of them at a point.
+    /// A renderer that walks through the object itself needs none: it reads [`Bsdf::subsurface`].
+    pub fn subsurface(self, lobe: impl HostLobe + 'static) -> Self {
+        let kind = HostKind::in_place_of(SubsurfaceParams::SPEC, Box::new(lobe));
+        let forms = std::iter::once(kind.form()).chain(subsurface::forms(LobeKind::Host(kind), ""));
+        let hosts = forms.chain(self.hosts.iter().copied()).collect();
+        Engine { hosts, ..self }
+    }
+
     /// Sets the budgets of scripts.
     pub fn limits(mut self, limits: Limits) -> Self {
         self.options.limits = limits;
@@ -195,7 +207,7 @@ impl Engine {
     pub fn builder(&self) -> Builder {
         let hosts = self.hosts.iter().filter_map(|form| match form.build {
             Build::Lobe { kind, .. } => Some(kind),
-            Build::Wrap { .. } | Build::Layer => None,
+            Build::Wrap { .. } | Build::Tinted { .. } | Build::Layer => None,
         });
         let builder = Builder::new().layering(self.layering).precision(self.tier.precision());
         builder.known(hosts, self.caches.single.clone())

@@ -68,7 +68,12 @@ fn lossless_and_reciprocal() {
         "eon(N, color(1, 0.6, 0.1), 0.8)",
         "velvet(N, 0.3)",
         "oren_nayar(N, 0.4)",
+        "microfacet_ggx(N, 0.1)",
+        "microfacet_ggx(N, 0.3)",
+        "microfacet_ggx(N, 0.8)",
+        "conductor_bsdf(N, dPdu, 0.3, 0.3, color(0.2, 0.4, 1.4), color(3.4, 2.3, 1.8), \"ggx\")",
         "color(0.4, 0.1, 0.6) * eon(N, color(1, 0.8, 0.3), 0.5) + color(0.6, 0.2, 0.1) * diffuse(N)",
+        "color(0.4, 0.1, 0.6) * microfacet_ggx(N, 0.4) + color(0.6, 0.2, 0.1) * eon(N, color(1, 0.8, 0.3), 0.5)",
     ];
     for top in tops {
         for base in bases {

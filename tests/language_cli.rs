@@ -83,6 +83,21 @@ fn codes_are_explained_and_trees_too() {
 }
 
 #[test]
+fn the_reference_of_closures_is_fresh_and_pictured() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let made = text(&overcoat(&["lobes", "--markdown"]).stdout);
+    let shipped = std::fs::read_to_string(root.join("lobes.md")).expect("there");
+    assert!(made == shipped, "run `overcoat lobes --markdown > docs/lobes.md`");
+    let linked = |(_, rest): (usize, &str)| rest.split_once(')').map(|(path, _)| path.to_owned());
+    let pictures: Vec<String> =
+        made.match_indices("](lobes/").map(|(at, m)| (at, &made[at + m.len() - 6..])).filter_map(linked).collect();
+    assert!(pictures.len() > 40, "{}", pictures.len());
+    for path in pictures {
+        assert!(root.join(&path).exists(), "{path}: run `overcoat lobes --gallery docs/lobes`");
+    }
+}
+
+#[test]
 fn the_shipped_header_is_fresh() {
     let made = text(&overcoat(&["lobes", "--header"]).stdout);
     let shipped =

@@ -60,7 +60,7 @@ impl Scatter for ClothAt {
         let Cloth { reflect, transmit, holes } = self.cloth;
         if u[2] >= reflect + transmit {
             let weight = [1.0; 3];
-            let flags = SampleFlags { transmit: true, delta: true };
+            let flags = SampleFlags { transmit: true, delta: true, ..SampleFlags::default() };
             let wi = (-self.wo).to_array();
             return (u[2] < reflect + transmit + holes).then_some(Sample {
                 wi,
@@ -77,7 +77,7 @@ impl Scatter for ClothAt {
         let (r, phi) = (u[0].sqrt(), u[1] * TAU);
         let wi = t * (r * phi.cos()) + b * (r * phi.sin()) + n * (1.0 - u[0]).sqrt();
         let Eval { f_cos, pdf } = self.eval(wi);
-        let flags = SampleFlags { transmit: n.dot(self.n) < 0.0, delta: false };
+        let flags = SampleFlags { transmit: n.dot(self.n) < 0.0, ..SampleFlags::default() };
         (pdf > 0.0).then_some(Sample {
             wi: wi.to_array(),
             f_cos,

@@ -9,6 +9,7 @@ use overcoat::albedo::quadrature::Rule;
 use overcoat::audit::chi2;
 use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
+use overcoat::lobes::registry::LobeClass;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::PI;
@@ -93,6 +94,24 @@ fn samples_follow_the_pdf_at_every_roughness_and_angle() {
                 assert!(result.passes(1e-5), "{name} r {r} cos {cos}: {result:?}");
                 assert!((result.pdf_integral - 1.0).abs() < 1e-3, "{name} r {r} cos {cos}: {result:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn what_one_lobe_loses_is_not_counted_as_anothers() {
+    // Facets send part of their samples below the horizon, where another lobe scatters.
+    let mut rng = Pcg64Mcg::seed_from_u64(12);
+    for kind in LobeKind::ALL.iter().copied().filter(|k| k.class() == LobeClass::Scatter) {
+        let mut tree = ClosureTree::new();
+        let (a, b) = (lobe(&mut tree, kind, &[]), lobe(&mut tree, LobeKind::Translucent, &[]));
+        let (a, b) = (tree.mul([0.5; 3], a), tree.mul([0.5; 3], b));
+        let root = tree.add(a, b);
+        tree.set_root(root);
+        let stack = Stack::<f32>::new(tree, Precision::FAST);
+        for cos in [0.6, 0.05] {
+            let result = chi2(&|w| stack.bsdf(w), at(cos), 40_000, &mut rng);
+            assert!(result.passes(1e-5), "{kind:?} cos {cos}: {result:?}");
         }
     }
 }

@@ -4,6 +4,7 @@
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
 //! nodes around each, so that it never lies below either; `view_bound` likewise, of E_view alone.
 
+use super::facets::FacetTables;
 use super::fibre::FibreTables;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
@@ -104,6 +105,8 @@ pub struct AlbedoCurve<S> {
     inv_range: S,
     /// For lobes that follow a thread; empty for all others.
     pub(super) fibre: FibreTables<S>,
+    /// For rough surfaces; empty for all others.
+    pub(super) facets: FacetTables<S>,
 }
 
 impl<S> Default for AlbedoCurve<S>
@@ -123,6 +126,27 @@ where
             lo: S::zero(),
             inv_range: S::zero(),
             fibre: FibreTables::default(),
+            facets: FacetTables::default(),
+        }
+    }
+}
+
+impl<S: Scalar> AlbedoCurve<S> {
+    /// The same numbers in double precision.
+    pub fn in_double(&self) -> AlbedoCurve<f64> {
+        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+        AlbedoCurve {
+            view: all(&self.view),
+            bound: all(&self.bound),
+            view_bound: all(&self.view_bound),
+            excess: all(&self.excess),
+            extra: all(&self.extra),
+            cos_nodes: self.cos_nodes,
+            rows: self.rows,
+            lo: self.lo.to_f64(),
+            inv_range: self.inv_range.to_f64(),
+            fibre: self.fibre.in_double(),
+            facets: self.facets.in_double(),
         }
     }
 }
@@ -203,12 +227,19 @@ impl<S: Real> AlbedoCurve<S> {
         [&self.view, &self.bound, &self.view_bound, &self.excess, &self.extra].map(Vec::len).iter().sum::<usize>()
             * size_of::<S>()
             + self.fibre.bytes()
+            + self.facets.bytes()
     }
 
     /// The tables of a lobe that follows a thread.
     #[inline(always)]
     pub fn fibre(&self) -> &FibreTables<S> {
         &self.fibre
+    }
+
+    /// The tables of a rough surface.
+    #[inline(always)]
+    pub fn facets(&self) -> &FacetTables<S> {
+        &self.facets
     }
 
     #[inline(always)]
@@ -279,6 +310,7 @@ impl CurveSpec {
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
             fibre: FibreTables::default(),
+            facets: FacetTables::default(),
         };
         let truth = |p: f64, cos: f64| quadrature.albedos(self, excess, p, cos);
         let lifts = shortfalls(&curve, truth, parameter, cosine);

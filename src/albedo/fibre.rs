@@ -11,6 +11,7 @@
 
 use super::bends::bends;
 use super::curve::{AlbedoCurve, CurveSpec, Precision, parallel};
+use super::facets::FacetSpec;
 use super::panels::Panels;
 use super::quadrature::Rule;
 use crate::optics::{Lift, Real, Scalar, V3};
@@ -78,6 +79,8 @@ pub enum TableSpec {
     Cosine(CurveSpec),
     /// Around a thread.
     Fibre(FibreSpec),
+    /// Of rough surfaces.
+    Facets(FacetSpec),
 }
 
 impl TableSpec {
@@ -88,6 +91,11 @@ impl TableSpec {
             TableSpec::Fibre(spec) => {
                 let mut curve = AlbedoCurve::default();
                 curve.fibre = spec.bake(precision);
+                curve
+            }
+            TableSpec::Facets(spec) => {
+                let mut curve = AlbedoCurve::default();
+                curve.facets = spec.bake(precision);
                 curve
             }
         }
@@ -121,6 +129,22 @@ impl<S> Default for FibreTables<S> {
             nodes: 0,
             axis: None,
             crossed: false,
+        }
+    }
+}
+
+impl<S: Scalar> FibreTables<S> {
+    pub(super) fn in_double(&self) -> FibreTables<f64> {
+        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+        FibreTables {
+            view: all(&self.view),
+            bound: all(&self.bound),
+            components: self.components,
+            sheets: self.sheets,
+            rows: self.rows,
+            nodes: self.nodes,
+            axis: self.axis,
+            crossed: self.crossed,
         }
     }
 }

@@ -5,9 +5,14 @@
 
 mod bends;
 pub mod curve;
+mod facet;
+pub mod facets;
 pub mod fibre;
+mod fill;
 mod panels;
 pub mod quadrature;
+mod visible;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
+pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
 pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, OFFSETS, Ridges, TableSpec};

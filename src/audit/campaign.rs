@@ -144,7 +144,16 @@ impl Block {
             verdict: Verdict::Holds,
         };
         match &self.tables {
-            PoolTables::Single(curves) => case.settle(&built, curves, &self.balancer, &mut rng),
+            PoolTables::Single(curves) => {
+                case.settle(&built, curves, &self.balancer, &mut rng);
+                if case.verdict != Verdict::Holds {
+                    // A peak α·cos wide, narrower than the directions of single precision lie, is integrated to nothing
+                    // or to much: the same tables in double precision decide.
+                    case.verdict = Verdict::Holds;
+                    case.settle(&built, &curves.in_double(), &self.balancer, &mut rng);
+                    case.method = Method::InDouble;
+                }
+            }
             PoolTables::Double(curves) => case.settle(&built, curves, &self.balancer, &mut rng),
         }
         case
@@ -176,7 +185,7 @@ fn normals(recipe: &Recipe) -> Vec<[f32; 3]> {
 }
 
 /// How an albedo was measured last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum Method {
     /// By 288 samples.
     Sampled,
@@ -184,6 +193,8 @@ pub enum Method {
     Resampled,
     /// By adaptive quadrature.
     Integrated,
+    /// By adaptive quadrature in double precision, because single left no digits.
+    InDouble,
 }
 
 /// What a measurement says.
@@ -295,7 +306,7 @@ impl Case {
             Verdict::Holds => 0,
         };
         // A sampled albedo is only a rough one.
-        (verdict, u8::from(self.method == Method::Integrated), self.albedo.max() - self.albedo.error)
+        (verdict, u8::from(self.method >= Method::Integrated), self.albedo.max() - self.albedo.error)
     }
 }
 
@@ -310,6 +321,8 @@ pub struct Tally {
     pub resampled: u64,
     /// Measured by quadrature.
     pub integrated: u64,
+    /// Of these, in double precision.
+    pub in_double: u64,
     /// Where sampling and quadrature disagree or the error is too large.
     pub unresolved: u64,
     /// Gains.
@@ -335,7 +348,8 @@ impl Tally {
         self.trees += 1;
         self.lobes += u64::from(case.lobes);
         self.resampled += u64::from(case.method != Method::Sampled);
-        self.integrated += u64::from(case.method == Method::Integrated);
+        self.integrated += u64::from(case.method >= Method::Integrated);
+        self.in_double += u64::from(case.method == Method::InDouble);
         self.unresolved += u64::from(case.verdict == Verdict::Unresolved);
         self.violations += u64::from(case.verdict == Verdict::Gains);
         for (count, level) in self.above.iter_mut().zip(LEVELS) {
@@ -352,6 +366,7 @@ impl Tally {
         self.lobes += other.lobes;
         self.resampled += other.resampled;
         self.integrated += other.integrated;
+        self.in_double += other.in_double;
         self.unresolved += other.unresolved;
         self.violations += other.violations;
         for (count, more) in self.above.iter_mut().zip(other.above) {

@@ -3,31 +3,8 @@
 //! A tensor product of Gauss–Kronrod (7, 15) rules; the rectangle with the largest error is halved along the
 //! direction that contributes most to it, until the sum of errors is below the tolerance. Deterministic.
 
+use crate::albedo::quadrature::{GAUSS, KRONROD, NODES};
 use std::collections::BinaryHeap;
-
-/// Nodes of the 15-point Kronrod rule on [−1, 1], the positive half; every second one belongs to the 7-point Gauss rule.
-const NODES: [f64; 8] = [
-    0.991_455_371_120_812_6,
-    0.949_107_912_342_758_5,
-    0.864_864_423_359_769_1,
-    0.741_531_185_599_394_4,
-    0.586_087_235_467_691_1,
-    0.405_845_151_377_397_2,
-    0.207_784_955_007_898_47,
-    0.0,
-];
-const KRONROD: [f64; 8] = [
-    0.022_935_322_010_529_224,
-    0.063_092_092_629_978_55,
-    0.104_790_010_322_250_18,
-    0.140_653_259_715_525_92,
-    0.169_004_726_639_267_9,
-    0.190_350_578_064_785_4,
-    0.204_432_940_075_298_9,
-    0.209_482_141_084_727_82,
-];
-const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_7, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
 
 /// An integral per channel, with an estimate of its absolute error (the largest over the channels).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +67,64 @@ pub fn integrate_until(
         }
         evaluations += 450;
     }
+}
+
+/// No cell is cut narrower.
+const NARROWEST: f64 = 1e-10;
+
+/// Splits `cells` until none holds more than `most` of the `points` (where a peak too narrow to be found was sampled).
+pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f64; 4]> {
+    // A peak at an edge lies on both sides of it, wherever its points fell: those close by count in both.
+    let fold = |x: f64, lo: f64, hi: f64| {
+        let folded = if x < lo {
+            2.0 * lo - x
+        } else if x >= hi {
+            2.0 * hi - x
+        } else {
+            x
+        };
+        ((lo..hi).contains(&x) || (folded - x).abs() < 0.02 * (hi - lo)).then_some(folded)
+    };
+    let of = |c: &[f64; 4]| -> Vec<[f64; 2]> {
+        points.iter().filter_map(|p| Some([fold(p[0], c[0], c[1])?, fold(p[1], c[2], c[3])?])).collect()
+    };
+    let mut open: Vec<([f64; 4], Vec<[f64; 2]>)> = cells.iter().map(|c| (*c, of(c))).collect();
+    let mut done = Vec::new();
+    while let Some((cell, mut points)) = open.pop() {
+        let ends = |axis: usize| {
+            let of = points.iter().map(|p| p[axis]);
+            of.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+        };
+        let spread = |axis: usize| (ends(axis).1 - ends(axis).0) / (cell[2 * axis + 1] - cell[2 * axis]);
+        // Across the direction in which the points lie closest together, measured in the cell.
+        let axis = usize::from(points.len() > 1 && spread(1) < spread(0));
+        let (lo, hi) = (cell[2 * axis], cell[2 * axis + 1]);
+        let (first, last) = ends(axis);
+        // A little at a time, so that the flanks of the peak get cells of their own.
+        let reach = (last - first).max(0.125 * (hi - lo)).max(NARROWEST);
+        let at = if points.len() < 2 {
+            None
+        } else if first - lo > 2.0 * reach {
+            // What is empty is cut off.
+            Some(first - reach)
+        } else if hi - last > 2.0 * reach {
+            Some(last + reach)
+        } else {
+            points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
+            let middle = points[points.len() / 2][axis];
+            (points.len() > most && middle > lo + NARROWEST && middle < hi - NARROWEST).then_some(middle)
+        };
+        let Some(at) = at else {
+            done.push(cell);
+            continue;
+        };
+        let (mut below, mut above) = (cell, cell);
+        (below[2 * axis + 1], above[2 * axis]) = (at, at);
+        let (under, over) = points.into_iter().partition(|p| p[axis] < at);
+        open.push((below, under));
+        open.push((above, over));
+    }
+    done
 }
 
 struct Cell {
@@ -182,6 +217,23 @@ mod tests {
         });
         approx::assert_abs_diff_eq!(i.value[0], 2.0 * (1.0 + 0.09 / 3.0), epsilon = 1e-4);
         approx::assert_abs_diff_eq!(i.value[1], std::f64::consts::PI * 0.25, epsilon = 2e-3);
+    }
+
+    #[test]
+    fn a_peak_is_found_where_points_show_it() {
+        let peak = |x: f64, y: f64| {
+            let r2 = (x - 0.31).powi(2) + (y - 0.77).powi(2);
+            [(-r2 / 1e-8).exp() / (1e-8 * std::f64::consts::PI), 0.0, 0.0]
+        };
+        let unit = [[0.0, 1.0, 0.0, 1.0]];
+        assert!(integrate(&unit, Tolerance::default(), peak).value[0] < 1e-3, "found without help");
+        let spiral = |k: usize| (2e-5 * (k as f64).sqrt(), 2.4 * k as f64);
+        let points: Vec<[f64; 2]> =
+            (0..64).map(spiral).map(|(r, a)| [0.31 + r * a.cos(), 0.77 + r * a.sin()]).collect();
+        let cells = split_at(&unit, &points, 4);
+        let area: f64 = cells.iter().map(|c| (c[1] - c[0]) * (c[3] - c[2])).sum();
+        approx::assert_abs_diff_eq!(area, 1.0, epsilon = 1e-12);
+        approx::assert_abs_diff_eq!(integrate(&cells, Tolerance::default(), peak).value[0], 1.0, epsilon = 1e-5);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! Each lobe is integrated in its own frame, where its horizon is an edge of the domain; delta lobes are added
 //! exactly.
 
-use super::cubature::{Tolerance, integrate, integrate_until};
+use super::cubature::{Tolerance, integrate, integrate_until, split_at};
 use super::{Subject, dot};
 use crate::closure::Bsdf;
 use crate::closure::bsdf::Cosine;
@@ -57,10 +57,11 @@ pub fn albedo_until<'m, S: Scalar>(
     let total = |value: [f64; 3], error: f64| Albedo { value: std::array::from_fn(|c| value[c] + delta[c]), error };
     let groups = groups(&held);
     let charts: Vec<Chart<S>> = groups.iter().map(|g| g.chart(w)).collect();
+    let hints = hints(&held);
     let cells: Vec<(usize, [f64; 4])> = charts
         .iter()
         .enumerate()
-        .flat_map(|(index, chart)| chart.cells().into_iter().map(move |c| (index, c)))
+        .flat_map(|(index, chart)| chart.cells_at(&hints).into_iter().map(move |c| (index, c)))
         .collect();
     let f = |index: usize, x: f64, y: f64| {
         let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
@@ -89,13 +90,15 @@ pub struct LobeShare {
 /// Where the energy goes, lobe by lobe, for ωo = `w`.
 pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolerance: Tolerance) -> Vec<LobeShare> {
     let bsdf = subject.bsdf(w);
+    let hints = hints(&bsdf);
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
+            let cells = chart.cells_at(&hints);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
-                    let i = integrate(&chart.cells(), tolerance, |x, y| {
+                    let i = integrate(&cells, tolerance, |x, y| {
                         let (wi, weight) = chart.direction(x, y);
                         bsdf.lobe_part(lobe, wi, layered).map(|x| x.to_f64() * weight)
                     });
@@ -105,6 +108,16 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
             LobeShare { lobe, scattered: of(true), unlayered: of(false) }
         })
         .collect()
+}
+
+/// Directions that light from (or toward) the held direction goes to: where to look for peaks.
+fn hints<S: Scalar>(held: &Bsdf<'_, S>) -> Vec<[S; 3]> {
+    let sample = |k: usize| {
+        // A rank-1 lattice in three dimensions.
+        let u = [0.819_172_5, 0.671_043_6, 0.549_700_5].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
+        held.sample(u).filter(|s| !s.flags.delta).map(|s| s.wi)
+    };
+    (0..256).filter_map(sample).collect()
 }
 
 /// Lobes that are integrated together, because their edges and ridges lie alike.
@@ -205,6 +218,30 @@ impl<S: Scalar> Chart<S> {
         }
     }
 
+    /// [`cells`](Self::cells), split among directions where light is known to go.
+    fn cells_at(&self, hints: &[[S; 3]]) -> Vec<[f64; 4]> {
+        let points: Vec<[f64; 2]> = hints.iter().map(|w| self.place(*w)).collect();
+        split_at(&self.cells(), &points, 16)
+    }
+
+    /// Where a direction in world space lies in the chart.
+    fn place(&self, w: [S; 3]) -> [f64; 2] {
+        let local = self.frame.to_local(vector(w)).map(|x| x.to_f64());
+        match self.layout {
+            Layout::AboutNormal { azimuth, .. } => {
+                let turn = (local.y.atan2(local.x) - azimuth + PI).rem_euclid(2.0 * PI);
+                [local.z.abs().sqrt().copysign(local.z), turn]
+            }
+            Layout::AroundThread { ridge, .. } => {
+                let off = local.x.atan2(local.y.hypot(local.z)) - ridge;
+                let length = if off < 0.0 { FRAC_PI_2 + ridge } else { FRAC_PI_2 - ridge };
+                let (lift, around) =
+                    if local.z < 0.0 { (2.0, (local.y).atan2(-local.z)) } else { (0.0, local.y.atan2(local.z)) };
+                [(off / length).cbrt(), lift + solve(turn, around, -1.0, 1.0)]
+            }
+        }
+    }
+
     /// A direction in world space, and the solid angle per area of the chart there.
     fn direction(&self, x: f64, y: f64) -> (V3<S>, f64) {
         let (direction, weight) = match self.layout {
@@ -252,16 +289,21 @@ pub(super) fn delta_albedo<'m, S: Scalar>(
     if side == Side::View {
         return held.delta_albedo().map(S::to_f64);
     }
-    // Light from ω leaves a delta lobe along the direction the lobe would show to a viewer there.
-    let mut seen: Vec<[S; 3]> = Vec::new();
+    // Light from ω leaves a delta lobe along the direction the lobe would show to a viewer there. Lobes are told apart by
+    // where they were constructed: toward the horizon the directions of different ones meet.
+    let mut seen: Vec<(LobeKind, u32, [S; 3])> = Vec::new();
     let mut sum = [0.0; 3];
-    for (direction, _) in held.delta_parts() {
-        if seen.iter().any(|d| dot(*d, direction) > 1.0 - 1e-6) {
+    for lobe in 0..held.lobe_count() {
+        let Some(direction) = held.lobe_delta_direction(lobe) else { continue };
+        let (kind, site) = held.lobe_kind(lobe);
+        if seen.iter().any(|s| (s.0, s.1) == (kind, site) && dot(s.2, direction) > 1.0 - 1e-6) {
             continue;
         }
-        seen.push(direction);
-        for (back, part) in subject.bsdf(direction).delta_parts() {
-            if dot(back, w) > 1.0 - 1e-6 {
+        seen.push((kind, site, direction));
+        let there = subject.bsdf(direction);
+        for other in (0..there.lobe_count()).filter(|o| there.lobe_kind(*o) == (kind, site)) {
+            if there.lobe_delta_direction(other).is_some_and(|back| dot(back, w) > 1.0 - 1e-6) {
+                let part = there.lobe_delta(other, true).unwrap_or([S::zero(); 3]);
                 for c in 0..3 {
                     sum[c] += part[c].to_f64();
                 }

@@ -159,7 +159,7 @@ fn named<T: Debug + Copy>(all: &[T], text: &Value) -> Option<T> {
 const TIERS: [Tier; 3] = [Tier::Fast, Tier::Standard, Tier::Reference];
 const SIDES: [Side; 2] = [Side::View, Side::Light];
 const TINTS: [TintRule; 2] = [TintRule::Largest, TintRule::Channel];
-const METHODS: [Method; 3] = [Method::Sampled, Method::Resampled, Method::Integrated];
+const METHODS: [Method; 4] = [Method::Sampled, Method::Resampled, Method::Integrated, Method::InDouble];
 const VERDICTS: [Verdict; 3] = [Verdict::Holds, Verdict::Unresolved, Verdict::Gains];
 
 impl Report {
@@ -176,6 +176,7 @@ impl Report {
             "lobes": t.lobes,
             "resampled": t.resampled,
             "integrated": t.integrated,
+            "in_double": t.in_double,
             "unresolved": t.unresolved,
             "violations": t.violations,
             "above": above,
@@ -200,6 +201,7 @@ impl Report {
             lobes: count("lobes")?,
             resampled: count("resampled")?,
             integrated: count("integrated")?,
+            in_double: count("in_double")?,
             unresolved: count("unresolved")?,
             violations: count("violations")?,
             ..Tally::default()
@@ -232,7 +234,9 @@ impl Report {
         for (level, count) in LEVELS.iter().zip(t.above) {
             let _ = writeln!(text, "  {count} with an albedo above {level}");
         }
-        let _ = writeln!(text, "  {} sampled again, {} integrated", t.resampled, t.integrated);
+        let (again, integrated, in_double) = (t.resampled, t.integrated, t.in_double);
+        let _ =
+            writeln!(text, "  {again} sampled again, {integrated} integrated, {in_double} of them in double precision");
         let _ = writeln!(text, "  {} unresolved, {} gain", t.unresolved, t.violations);
         if !t.worst.is_empty() {
             text.push_str("\nthe worst, with what to measure them by:\n");

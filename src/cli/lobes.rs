@@ -24,6 +24,9 @@ pub fn run(global: &Global, name: Option<&str>) -> Outcome {
         let _ = writeln!(text, "{}", form.signature());
         if name.is_some() {
             let _ = writeln!(text, "\n{}\nSource: {}", paragraph(form.doc), form.source);
+            if !form.note.is_empty() {
+                let _ = writeln!(text, "Note: {}", form.note);
+            }
             let _ = writeln!(text, "Reciprocal at its defaults: {}\n", if form.reciprocal { "yes" } else { "no" });
             for p in form.params {
                 let _ = writeln!(text, "  {} {}{}\n      {}", p.ty.name(), p.name, range(p), paragraph(p.doc));
@@ -41,20 +44,29 @@ pub fn run(global: &Global, name: Option<&str>) -> Outcome {
 /// Closures that stdosl.h declares itself, with these arguments.
 const STANDARD: &[&str] = &[
     "background",
+    "burley_diffuse_bsdf",
+    "conductor_bsdf",
     "debug",
+    "dielectric_bsdf",
     "diffuse",
     "emission",
+    "generalized_schlick_bsdf",
     "holdout",
     "layer",
     "microfacet",
     "oren_nayar",
+    "oren_nayar_diffuse_bsdf",
     "phong",
     "reflection",
     "refraction",
     "sheen_bsdf",
     "subsurface",
+    "subsurface_bssrdf",
     "translucent",
+    "translucent_bsdf",
     "transparent",
+    "transparent_bsdf",
+    "uniform_edf",
     "ward",
 ];
 
@@ -92,13 +104,14 @@ fn describe(form: &Form) -> Value {
         .collect();
     json!({
         "name": form.name, "signature": form.signature(), "params": params, "source": form.source,
-        "reciprocal": form.reciprocal, "doc": paragraph(form.doc),
+        "reciprocal": form.reciprocal, "doc": paragraph(form.doc), "note": form.note,
     })
 }
 
 fn default(p: &ParamSpec) -> Value {
     match (p.ty, p.default) {
         (_, []) => Value::Null,
+        (ParamTy::String, _) if p.options.is_empty() => Value::Null,
         (ParamTy::String, [index]) => json!(p.options.get(*index as usize)),
         (ParamTy::Int, [x]) => json!(*x as i64),
         (_, [x]) => number(*x),
@@ -115,11 +128,11 @@ fn limit(p: &ParamSpec, x: f32) -> Value {
     }
 }
 
-fn range(p: &ParamSpec) -> String {
+pub(super) fn range(p: &ParamSpec) -> String {
     let mut text = String::new();
     if !p.options.is_empty() {
         let _ = write!(text, ", one of {}", p.options.join(", "));
-    } else if p.min.is_finite() || p.max.is_finite() {
+    } else if p.ty != ParamTy::String && (p.min.is_finite() || p.max.is_finite()) {
         let _ = write!(text, ", {} to {}", p.min, p.max);
     }
     if let (false, Value::String(s)) = (p.default.is_empty(), default(p)) {
@@ -131,6 +144,6 @@ fn range(p: &ParamSpec) -> String {
 }
 
 /// A doc comment as one paragraph.
-fn paragraph(doc: &str) -> String {
+pub(super) fn paragraph(doc: &str) -> String {
     doc.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -13,6 +13,7 @@ mod input;
 mod lobes;
 mod output;
 mod reciprocity;
+mod reference;
 mod render;
 mod reproduce;
 mod sample;
@@ -145,6 +146,12 @@ enum Command {
         /// Write the header that declares to other compilers what their own header lacks.
         #[arg(long, conflicts_with = "name")]
         header: bool,
+        /// Write the reference of all closures, as docs/lobes.md holds it.
+        #[arg(long, conflicts_with_all = ["name", "header"])]
+        markdown: bool,
+        /// Render a picture beside each script of a folder, as docs/lobes holds them.
+        #[arg(long, value_name = "DIR", conflicts_with_all = ["name", "header", "markdown"])]
+        gallery: Option<PathBuf>,
     },
     /// Make a picture of the material.
     Render(render::RenderArgs),
@@ -189,6 +196,8 @@ pub fn main() -> ExitCode {
         Command::Furnace(args) => furnace::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { header: true, .. } => lobes::header(),
+        Command::Lobes { markdown: true, .. } => reference::markdown(),
+        Command::Lobes { gallery: Some(folder), .. } => reference::gallery(&cli.global, folder),
         Command::Lobes { name, .. } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),

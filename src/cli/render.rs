@@ -56,6 +56,27 @@ pub struct RenderArgs {
     sweep: Option<String>,
 }
 
+impl RenderArgs {
+    /// Small pictures for a gallery.
+    pub(super) fn small(file: &Path, output: &Path, sweep: Option<String>) -> Self {
+        RenderArgs {
+            file: file.to_owned(),
+            output: output.to_owned(),
+            scene: SceneArg::Sphere,
+            env: None,
+            spp: 64,
+            size: "120".into(),
+            seed: 0,
+            threads: 0,
+            exposure: 0.0,
+            depth: 8,
+            watch: false,
+            compare: None,
+            sweep,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum SceneArg {
     /// A sphere on a neutral floor.

@@ -5,8 +5,8 @@ use super::{Failure, Global, Outcome, output};
 use crate::closure::{ClosureTree, Fate, LayeringRule, Node, NodeId};
 use crate::engine::Material;
 use crate::globals::Globals;
-use crate::lobes::LobeKind;
 use crate::lobes::registry::ParamTy;
+use crate::lobes::{LobeKind, tags};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -143,6 +143,7 @@ fn lobe(kind: LobeKind, values: &[f32]) -> Value {
         let slots = &values[at..at + p.ty.slots()];
         at += p.ty.slots();
         let value = match (p.ty, slots) {
+            (ParamTy::String, [index]) if p.options.is_empty() => json!(tags::name(*index as usize)),
             (ParamTy::String, [index]) => json!(p.options.get(p.clamp(0, *index) as usize)),
             (ParamTy::Int, [x]) => json!(*x as i64),
             (_, [x]) => number(*x),

@@ -8,6 +8,7 @@ use super::flatten::Layering;
 use super::layer::{LayerStack, LayeringRule, TintRule};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
+use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
 use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch};
 use smallvec::SmallVec;
@@ -41,6 +42,30 @@ pub struct Sample<S = f32> {
     pub roughness: S,
 }
 
+/// Something a material tells the renderer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signal<S = f32> {
+    /// What it stands for.
+    pub kind: SignalKind,
+    /// Its weight, dimmed by the layers above it.
+    pub value: Rgb<S>,
+}
+
+/// Scattering below the surface that a material asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubsurfacePart<S = f32> {
+    /// What comes back of white light from all around, weights and layers toward ωo included.
+    pub albedo: Rgb<S>,
+    /// The shading normal, world space.
+    pub normal: [S; 3],
+    /// Mean free path per channel, in the scene's unit.
+    pub radius: [f32; 3],
+    /// Mean cosine of scattering, in [−1, 1].
+    pub anisotropy: f32,
+    /// Index of refraction of the medium.
+    pub ior: f32,
+}
+
 /// What kind of scattering a sample is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SampleFlags {
@@ -48,6 +73,8 @@ pub struct SampleFlags {
     pub transmit: bool,
     /// The direction comes from a delta lobe; `pdf` is a probability.
     pub delta: bool,
+    /// The direction comes from a diffuse lobe that stands in for scattering below the surface.
+    pub subsurface: bool,
 }
 
 /// One lobe of a flattened tree.
@@ -106,6 +133,7 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
+    pub(crate) signals: SmallVec<[Signal<S>; 8]>,
 }
 
 /// Which cosine multiplies f.
@@ -113,9 +141,9 @@ pub struct Bsdf<'m, S: Real = f32> {
 pub(crate) enum Cosine {
     /// |N·ωi|: light arriving from ωi, seen from ωo.
     Light,
-    /// |N·ωo|: the adjoint.
+    /// |N·ωo|: the adjoint, f·(ηo/ηi)².
     View,
-    /// None: f itself.
+    /// None: f·ηo/ηi, which is symmetric where f is reciprocal.
     None,
 }
 
@@ -133,6 +161,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             layers: SmallVec::new(),
             frames: SmallVec::new(),
             emission: [S::zero(); 3],
+            signals: SmallVec::new(),
         }
     }
 
@@ -160,6 +189,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             l.probability = p;
         }
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
+        for s in &mut self.signals {
+            s.value = s.value.map(|v| v.min(S::c(1e30)));
+        }
     }
 
     /// f·|cos| and pdf of one direction.
@@ -167,10 +199,17 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// `wi`: world space, unit, away from the surface. A direction that is not finite, or shorter than ½ or longer than
     /// 2, gives black and pdf 0.
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
+        self.eval_each(vector(wi.into()), |_, _| {})
+    }
+
+    /// [`eval`](Self::eval), telling `each` the index and the density of every lobe.
+    #[inline(always)]
+    fn eval_each(&self, wi: V3<S>, mut each: impl FnMut(usize, S)) -> Eval<S> {
         let mut sum = Eval { f_cos: [S::zero(); 3], pdf: S::zero() };
-        self.walk(vector(wi.into()), false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+        self.walk(wi, false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
             let e = l.lobe.evaluate(local, l.curve, bound);
             sum.add(l, scale, local.z, &e);
+            each(i, e.pdf);
             e.bound
         });
         sum.f_cos = sum.f_cos.map(finite);
@@ -188,12 +227,13 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             + 4 * size_of::<usize>()
     }
 
-    /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi|: what E_light integrates over ωo.
+    /// [`eval`](Self::eval) with |N·ωo| in place of |N·ωi| and, across media, times (ηo/ηi)²: what E_light integrates
+    /// over ωo.
     pub fn eval_adjoint(&self, wi: [S; 3]) -> Rgb<S> {
         self.part(vector(wi), Cosine::View, |_, _| true)
     }
 
-    /// Σ w·f without cosines: symmetric in its directions if the BSDF is reciprocal.
+    /// Σ w·f without cosines, times ηo/ηi across media: symmetric in its directions if the BSDF is reciprocal.
     pub fn f(&self, wi: [S; 3]) -> Rgb<S> {
         self.part(vector(wi), Cosine::None, |_, _| true)
     }
@@ -209,12 +249,22 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let (local, _) = l.lobe.delta()?;
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
-            let flags = SampleFlags { transmit: transmit(wi), delta: true };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, l);
+            let flags = SampleFlags { transmit: transmit(wi), delta: true, ..SampleFlags::default() };
+            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, l, local);
         }
-        let wi = frame.to_world(l.lobe.sample([u[0], u[1]]));
-        let eval = self.eval([wi.x, wi.y, wi.z]);
-        Self::sampled(wi, eval, SampleFlags { transmit: transmit(wi), delta: false }, l)
+        let local = l.lobe.sample([u[0], u[1]]);
+        let wi = frame.to_world(local);
+        let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
+        let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };
+        Self::sampled(wi, self.eval_own(wi, index)?, flags, l, local)
+    }
+
+    /// [`eval`](Self::eval) of a direction that lobe `index` gave. `None` where that lobe's density is 0, as below a
+    /// horizon: another lobe may scatter there, but the sample is not one of its own.
+    fn eval_own(&self, wi: V3<S>, index: usize) -> Option<Eval<S>> {
+        let mut own = S::zero();
+        let eval = self.eval_each(wi, |i, pdf| own = if i == index { pdf } else { own });
+        (own > S::zero()).then_some(eval)
     }
 
     /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
@@ -224,11 +274,17 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
-    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, lobe: &FlatLobe<'m, S>) -> Option<Sample<S>> {
+    fn sampled(
+        wi: V3<S>,
+        eval: Eval<S>,
+        flags: SampleFlags,
+        lobe: &FlatLobe<'m, S>,
+        local: V3<S>,
+    ) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
         let fine = pdf > S::zero() && weight.iter().all(|w| w.is_finite());
-        let (eta, roughness) = (S::one(), lobe.lobe.roughness());
+        let (eta, roughness) = (S::one() / lobe.lobe.relative_eta(local), lobe.lobe.roughness());
         fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta, roughness })
     }
 
@@ -252,6 +308,30 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Radiance given off toward ωo.
     pub fn emission(&self) -> Rgb<S> {
         self.emission
+    }
+
+    /// What the material tells the renderer beside light: `holdout`, `background` and `debug`, one entry per kind and name.
+    pub fn signals(&self) -> &[Signal<S>] {
+        &self.signals
+    }
+
+    pub(crate) fn signal(&mut self, kind: SignalKind, value: Rgb<S>) {
+        match self.signals.iter_mut().find(|s| s.kind == kind) {
+            Some(s) => s.value = std::array::from_fn(|c| s.value[c] + value[c]),
+            None => self.signals.push(Signal { kind, value }),
+        }
+    }
+
+    /// What is to be scattered below the surface, for a renderer that does so itself. The BSDF counts it as diffuse.
+    pub fn subsurface(&self) -> impl Iterator<Item = SubsurfacePart<S>> {
+        self.lobes.iter().filter_map(|l| match &l.lobe {
+            AnyLobe::Subsurface(lobe) => {
+                let (radius, anisotropy, ior) = lobe.medium();
+                let n = self.frames[l.frame as usize].n;
+                Some(SubsurfacePart { albedo: l.albedo, normal: [n.x, n.y, n.z], radius, anisotropy, ior })
+            }
+            _ => None,
+        })
     }
 
     /// Whether nothing is scattered at all.
@@ -293,11 +373,14 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// The delta lobes: the direction each scatters to (world space) and how much, weights and layers included.
     pub fn delta_parts(&self) -> impl Iterator<Item = ([S; 3], Rgb<S>)> {
-        (0..self.lobes.len()).filter_map(|i| {
-            let (local, _) = self.lobes[i].lobe.delta()?;
-            let wi = self.frames[self.lobes[i].frame as usize].to_world(local);
-            Some(([wi.x, wi.y, wi.z], self.lobe_delta(i, true)?))
-        })
+        (0..self.lobes.len()).filter_map(|i| Some((self.lobe_delta_direction(i)?, self.lobe_delta(i, true)?)))
+    }
+
+    /// The direction delta lobe `index` scatters to, in world space; `None` for other lobes.
+    pub(crate) fn lobe_delta_direction(&self, index: usize) -> Option<[S; 3]> {
+        let (local, _) = self.lobes[index].lobe.delta()?;
+        let wi = self.frames[self.lobes[index].frame as usize].to_world(local);
+        Some([wi.x, wi.y, wi.z])
     }
 
     /// What delta lobe `index` scatters, with or without the layers above it (which look at ωo and at its own
@@ -541,8 +624,8 @@ fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine:
     let f = l.lobe.f(local, l.curve);
     let cos = match cosine {
         Cosine::Light => local.z.abs().min(S::one()),
-        Cosine::View => l.cos_o,
-        Cosine::None => S::one(),
+        Cosine::View => l.cos_o * l.lobe.relative_eta(local).sq(),
+        Cosine::None => l.lobe.relative_eta(local),
     };
     std::array::from_fn(|c| l.weight[c] * scale[c] * f[c] * cos)
 }

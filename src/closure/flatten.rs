@@ -11,6 +11,7 @@ use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
+use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
 use crate::optics::{Scalar, V3, frame};
 use glam::Vec3;
@@ -61,6 +62,15 @@ impl<S: Scalar> Curves<S> {
             curves.set(site, kind.table(&known), precision);
         }
         curves
+    }
+
+    /// The same tables in double precision.
+    pub fn in_double(&self) -> Curves<f64> {
+        Curves {
+            baked: self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.in_double()))).collect(),
+            sites: self.sites.clone(),
+            none: AlbedoCurve::default(),
+        }
     }
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
@@ -274,6 +284,11 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
                 self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
             }
             lobes.pop();
+            return;
+        }
+        if let Some(kind) = SignalKind::of(&l.lobe) {
+            lobes.pop();
+            self.bsdf.signal(kind, std::array::from_fn(|c| w.total[c] * scale[c]));
             return;
         }
         let albedo = l.lobe.albedo(wo, curve);

@@ -11,7 +11,7 @@ pub mod tree;
 mod walk;
 
 pub use balance::{Balance, Balancer, Fate, Unbalanced};
-pub use bsdf::{Bsdf, Eval, Sample, SampleFlags};
+pub use bsdf::{Bsdf, Eval, Sample, SampleFlags, Signal, SubsurfacePart};
 pub use builder::{Builder, Composite};
 pub use flatten::{Curves, Layering, TableCache, Tables, flatten, flatten_into};
 pub use layer::{LayeringRule, TintRule};

@@ -101,7 +101,10 @@ pub(super) fn directions(kind: LobeKind, values: &[f32], globals: &Globals) -> (
     let spec = kind.spec();
     let vector =
         |slot: Option<usize>, default: Vec3| slot.and_then(|s| values.get(s..s + 3)).map_or(default, Vec3::from_slice);
-    (vector(spec.normal_slot(), globals.n), vector(spec.tangent_slot(), globals.dpdu))
+    let n = vector(spec.normal_slot(), globals.n);
+    // Seen from inside, N was turned toward the viewer; a lobe between media knows its sides by the outside.
+    let n = if globals.backfacing && kind.between_media(values) { -n } else { n };
+    (n, vector(spec.tangent_slot(), globals.dpdu))
 }
 
 /// The frame that [`directions`] span.

@@ -211,6 +211,17 @@ pub const CODES: &[Code] = &[
          host gives none.",
     ),
     code(
+        "W0507",
+        "a closure is not quite what its name says",
+        "Another renderer means something else by this name. The message says what differs; `overcoat lobes NAME` shows what\n\
+         the closure becomes.",
+    ),
+    code(
+        "W0508",
+        "an argument of a closure has no effect",
+        "Other renderers read the argument; here it is accepted and changes nothing. The message says why.",
+    ),
+    code(
         "W0702",
         "whether the material gains energy could not be decided",
         "The proof came to no end within its effort, or met something it does not follow. That the material gains is neither\n\

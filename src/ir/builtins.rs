@@ -356,6 +356,27 @@ pub const CONSTANTS: &[(&str, f32)] = &[
 
 /// Functions of OSL that are not there, and why.
 pub const UNSUPPORTED: &[(&str, &str)] = &[
+    ("absorption", VOLUME),
+    ("ambient_occlusion", "it needs rays; the renderer's lights give the same"),
+    ("anisotropic_vdf", VOLUME),
+    ("ashikhmin_shirley", "use `microfacet(\"ggx\", N, T, ax, ay, 0, 0)`"),
+    ("bssrdf_cubic", "use `subsurface_bssrdf(N, albedo, radius, anisotropy)`"),
+    ("chiang_hair_bsdf", HAIR),
+    ("diffuse_ramp", "closures take no arrays; scale `diffuse(N)` with a `spline`"),
+    ("diffuse_toon", "it gains energy at its edge; use `diffuse(N)`"),
+    ("glossy_toon", "it gains energy at its edge; use `microfacet`"),
+    ("hair_diffuse", HAIR),
+    ("hair_reflection", HAIR),
+    ("hair_specular", HAIR),
+    ("hair_transmission", HAIR),
+    ("henyey_greenstein", VOLUME),
+    ("medium_vdf", VOLUME),
+    ("phong_ramp", "closures take no arrays; scale `phong(N, exponent)` with a color"),
+    ("principled_clearcoat", "use `dielectric_bsdf` with a black transmission tint"),
+    ("principled_hair", HAIR),
+    ("principled_sheen", "use `sheen_bsdf(N, albedo, roughness)`"),
+    ("westin_backscatter", "use `sheen_bsdf(N, albedo, roughness)`"),
+    ("westin_sheen", "use `sheen_bsdf(N, albedo, roughness)`"),
     ("bump", "it moves points; compute a normal and give it to the closures"),
     ("dict_find", "dictionaries are not read"),
     ("dict_next", "dictionaries are not read"),
@@ -380,6 +401,9 @@ pub const UNSUPPORTED: &[(&str, &str)] = &[
     ("trace", "materials send no rays"),
     ("transformu", "units are not known"),
 ];
+
+const VOLUME: &str = "volumes are the renderer's business; this is about surfaces";
+const HAIR: &str = "it needs a curve; for cloth threads there are `thread` and `microcylinder`";
 
 /// What is said about a function that is not quite what its name says. `given`: the host gives derivatives.
 pub fn warning(name: &str, given: bool) -> Option<&'static str> {

@@ -13,6 +13,7 @@ use super::tasks::{Strings, Surroundings};
 use super::types::Ty;
 use crate::Globals;
 use crate::closure::{ClosureTree, NodeId};
+use crate::lobes::registry::option_index;
 use smallvec::SmallVec;
 
 impl Program {
@@ -46,7 +47,7 @@ impl Program {
                 Instr::OptionIndex { options, dst, name } => {
                     let name = strings.get(cells[name as usize]);
                     // A name that is only known now and unknown to the lobe means its first option.
-                    let index = options.iter().position(|option| *option == name).unwrap_or(0);
+                    let index = option_index(options, name).unwrap_or(0);
                     cells[dst as usize] = (index as f32).to_bits();
                 }
                 Instr::Element { .. } | Instr::ElementC { .. } | Instr::Store { .. } | Instr::StoreC { .. } => {

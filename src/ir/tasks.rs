@@ -10,6 +10,7 @@ use super::ops::divide;
 use super::shader::Value;
 use super::types::Ty;
 use crate::globals::Globals;
+use crate::lobes::conductor;
 
 /// One of them. The arguments and results stand in the order of the comment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +53,8 @@ pub enum Task {
     Split,
     /// A pattern and values.
     Say(Speech),
+    /// Reflectance and edge tint, colors: n and k of a metal, colors.
+    ArtisticIor,
     /// A value: whether it is known before shading.
     IsConstant,
     /// A basis, a place, and knots, as many as cells of the result each: the value there.
@@ -168,6 +171,11 @@ impl Task {
             Task::Spline => spline(args, around, out),
             Task::SplineInverse => spline_inverse(args, around, out),
             Task::Fresnel => fresnel(triple(0), triple(1), float(2, 0), out),
+            Task::ArtisticIor => {
+                let (n, k) = conductor::artistic_ior(triple(0), triple(1));
+                put_triple(out, n);
+                put_triple(&mut out[1..], k);
+            }
             Task::IsConstant => put_int(out, 0),
             Task::RayType | Task::IsConnected => {
                 let Surroundings { strings, host, globals } = around;

@@ -13,25 +13,12 @@
 //! Nothing here calls an inverse function where angles cancel: with s = sin θi + sin θo and c = cos θi + cos θo,
 //! tan θh = s/c and s² + c² = 4 cos² θd; with unit vectors p around the thread, |pi + po| = 2 cos(φd/2).
 
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Real, V3, fresnel};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// cos θi + cos θo is taken as at least this: where both directions run along the thread the paper's division has no
 /// limit.
 const MIN_COS_SUM: f64 = 0.02;
-
-/// Reflectance of a dielectric surface for unpolarised light at cosine `c`; `m` is η² − 1 ≥ 0.
-///
-/// g − c is written as m/(g + c): the difference itself has no digits left for η near 1.
-#[inline(always)]
-pub fn fresnel<L: Real>(m: L, c: L) -> L {
-    let c = c.clamp(L::zero(), L::one());
-    let g = c.mul_add(c, m).safe_sqrt();
-    let sum = (g + c).max(L::c(1e-12));
-    let difference = m / sum;
-    let ratio = (c * sum - L::one()) / (c * difference + L::one());
-    (L::c(0.5) * (difference / sum).sq() * ratio.mul_add(ratio, L::one())).min(L::one())
-}
 
 /// A direction in the coordinates of a thread.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +106,7 @@ impl<S: Real> Cylinder<S> {
         let th2 = theta_h * theta_h;
         let turned = ((o.py + i.py).sq() + (o.pz + i.pz).sq()).sqrt();
         let cos_half = (L::c(0.5) * turned).min(L::one());
-        let reflected = fresnel(L::lift(self.m), L::c(0.5) * four_cos2_d.sqrt() * cos_half);
+        let reflected = fresnel::dielectric(L::lift(self.m), L::c(0.5) * four_cos2_d.sqrt() * cos_half);
         let gauss = |(k, norm): (S, S)| L::lift(norm) * (-(L::lift(k) * th2)).exp();
         let half = L::c(0.5) * inv_cos2_d;
         let even = half * (L::one() - reflected).sq() / c.max(L::c(MIN_COS_SUM));
@@ -252,11 +239,11 @@ mod tests {
         for eta in [1.0f64, 1.000_001, 1.345, 1.5, 3.0] {
             let m = (eta - 1.0) * (eta + 1.0);
             let head_on = ((eta - 1.0) / (eta + 1.0)).powi(2);
-            approx::assert_relative_eq!(fresnel(m, 1.0), head_on, epsilon = 1e-30, max_relative = 1e-9);
-            let single = fresnel(m as f32, 1.0f32) as f64;
+            approx::assert_relative_eq!(fresnel::dielectric(m, 1.0), head_on, epsilon = 1e-30, max_relative = 1e-9);
+            let single = fresnel::dielectric(m as f32, 1.0f32) as f64;
             approx::assert_relative_eq!(single, head_on, epsilon = 1e-30, max_relative = 1e-5);
             if eta > 1.0 {
-                assert!((fresnel(m, 0.0) - 1.0).abs() < 1e-9);
+                assert!((fresnel::dielectric(m, 0.0) - 1.0).abs() < 1e-9);
             }
         }
     }

@@ -242,12 +242,20 @@ impl HostKind {
             source: spec.source.leak(),
             reciprocal: spec.reciprocal,
             class: LobeClass::Scatter,
+            note: "",
         };
         /// So that tools that look for leaks find all of them held.
         static KEPT: Mutex<Vec<HostKind>> = Mutex::new(Vec::new());
         let kind = HostKind(Box::leak(Box::new(HostClosure { spec: spec_of, most: spec.most, lobe })));
         KEPT.lock().unwrap_or_else(PoisonError::into_inner).push(kind);
         Ok(kind)
+    }
+
+    /// A closure with the signature of a built-in one.
+    pub(crate) fn in_place_of(spec: &'static LobeSpec, lobe: Box<dyn HostLobe>) -> HostKind {
+        let LobeSpec { name, params, doc, source, reciprocal, layout, .. } = *spec;
+        let spec = LobeSpec { name, params, doc, source, reciprocal, class: LobeClass::Scatter, note: "", layout };
+        HostKind(Box::leak(Box::new(HostClosure { spec, most: 1.0, lobe })))
     }
 
     /// Its declaration.

@@ -52,6 +52,10 @@ pub(super) fn of_table(kind: LobeKind, ranges: &[SlotRange], cos: (f64, f64)) ->
             let highest = around_the_thread(kind, spec, &values).unwrap_or(1.0);
             Limits::above(cos, 0.0, highest.min(1.0))
         }
+        TableSpec::Facets(_) => {
+            let rough = at_the_nodes(kind, spec, ranges, &values, cos);
+            rough.unwrap_or(Limits { lowest: 0.0, highest: 1.0 })
+        }
     }
 }
 
@@ -98,6 +102,54 @@ fn around_the_thread(kind: LobeKind, spec: TableSpec, values: &[Option<f32>]) ->
     }
     known.push((kind, key, highest));
     Some(highest)
+}
+
+/// Of a rough surface whose parameters are all known, or but for its tints: its bound is linear between the nodes of its
+/// table. One between two media may be met from either.
+fn at_the_nodes(
+    kind: LobeKind,
+    spec: TableSpec,
+    ranges: &[SlotRange],
+    values: &[Option<f32>],
+    cos: (f64, f64),
+) -> Option<Limits> {
+    // With the tints at either end of their ranges.
+    let block = |end: fn(&SlotRange) -> f32| -> Option<Vec<f32>> {
+        let mut block = Vec::new();
+        for p in kind.spec().params {
+            for slot in 0..p.ty.slots() {
+                let at = block.len();
+                block.push(match p.ty {
+                    ParamTy::Normal => [0.0, 0.0, 1.0][slot],
+                    ParamTy::Vector => [1.0, 0.0, 0.0][slot],
+                    ParamTy::Color if p.name.ends_with("tint") => end(ranges.get(at)?),
+                    _ => (*values.get(at)?)?,
+                });
+            }
+        }
+        Some(block)
+    };
+    let (low, high) = (block(|r| r.0)?, block(|r| r.1)?);
+    let table = baked(spec, Precision::STANDARD);
+    let two_sided = kind.between_media(&high);
+    let sides = if two_sided {
+        let ends = (cos.0.abs().min(cos.1.abs()), cos.0.abs().max(cos.1.abs()));
+        let near = if cos.0 < 0.0 && cos.1 > 0.0 { 0.0 } else { ends.0 };
+        vec![(near, ends.1), (-ends.1, -near)]
+    } else {
+        vec![cos]
+    };
+    let (mut lowest, mut highest) = (1.0f64, 0.0f64);
+    for w in sides.iter().flat_map(|c| table.facets().directions(*c)) {
+        let lobe = |block: &[f32]| AnyLobe::<f64>::new(kind, block, w, &table);
+        let (view, bound) = (lobe(&low).albedo(w, &table), lobe(&high).albedo_bound(w, &table));
+        for c in 0..3 {
+            lowest = lowest.min(view[c] - VIEW_ERROR);
+            highest = highest.max(bound[c]);
+        }
+    }
+    let limits = Limits { lowest: lowest.max(0.0), highest: highest.min(1.0) };
+    Some(if two_sided { limits } else { Limits::above(cos, limits.lowest, limits.highest) })
 }
 
 /// The largest albedo of each component over all directions.

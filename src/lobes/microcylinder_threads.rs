@@ -25,7 +25,7 @@
 //! high.
 
 use super::cloth::{self, ClothParams, EVENLY, FLAT, Woven, Yarn};
-use super::registry::{Build, ClosureParams, Form, closure};
+use super::registry::{ClosureParams, Form, closure};
 use super::{LobeKind, Rgb32};
 use crate::albedo::{COMPONENTS, FibreKey, TableSpec};
 use crate::optics::V3;
@@ -73,11 +73,8 @@ closure! {
 }
 
 /// `microcylinder(N, T, A1, …)`, beside `microcylinder(N, T, preset)`.
-pub(super) const FORM: Form = Form {
-    name: "microcylinder",
-    build: Build::Lobe { kind: LobeKind::MicrocylinderThreads, args: &[] },
-    ..Form::of_lobe(LobeKind::MicrocylinderThreads, MicrocylinderThreadsParams::SPEC)
-};
+pub(super) const FORM: Form =
+    Form { name: "microcylinder", ..Form::of_lobe(LobeKind::MicrocylinderThreads, MicrocylinderThreadsParams::SPEC) };
 
 /// What a table depends on, family after family.
 const SHAPE: [&str; 12] =

@@ -7,26 +7,43 @@
 pub mod charlie;
 pub mod ltc;
 pub mod registry;
+pub mod tags;
 
+mod aliases;
+pub mod burley;
 mod charlie_terms;
 mod cloth;
 mod cloth_range;
+pub mod conductor;
 pub mod cylinder;
+pub mod dielectric;
 pub mod diffuse;
 pub mod emission;
 pub mod eon;
 pub mod fabric;
 pub mod host;
+mod interface;
 pub mod limits;
 mod ltc_tables;
+pub mod metal;
 pub mod microcylinder;
 pub mod microcylinder_threads;
+pub mod microfacet;
 pub mod oren_nayar;
+pub mod oren_nayar_diffuse;
+mod pane;
+pub mod phong;
+mod rough;
+pub mod schlick;
 pub mod sheen;
+pub mod signals;
+pub mod specular;
+pub mod subsurface;
 pub mod thread;
 pub mod translucent;
 pub mod transparent;
 pub mod velvet;
+pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{F32x8, Lift, Real, V3};
@@ -85,6 +102,25 @@ pub trait Lobe<S: Real>: Sized + Copy {
     fn reciprocal(params: &Self::Params) -> bool {
         let _ = params;
         Self::Params::SPEC.reciprocal
+    }
+
+    /// Whether f of this instance depends on where the tangent points.
+    fn follows_tangent(params: &Self::Params) -> bool {
+        let _ = params;
+        Self::Params::SPEC.tangent_slot().is_some()
+    }
+
+    /// Whether it lies between two media: z points to the outside, also where the host turned N toward a viewer inside.
+    fn between_media(params: &Self::Params) -> bool {
+        let _ = params;
+        false
+    }
+
+    /// The index of refraction on ωo's side over that on ωi's; 1 unless light crosses into another medium. The adjoint
+    /// of f is f times its square.
+    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let _ = wi;
+        L::one()
     }
 
     /// Prepares everything that depends on the parameters and on ωo alone.
@@ -242,6 +278,23 @@ macro_rules! lobes {
                 match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
             }
 
+            /// Whether f of a lobe with these parameter values depends on where its tangent points; of a host's lobe that
+            /// is not known.
+            pub fn follows_tangent(self, values: &[f32]) -> bool {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::follows_tangent(&params)
+                }, )* LobeKind::Host(_) => true }
+            }
+
+            /// See [`Lobe::between_media`].
+            pub fn between_media(self, values: &[f32]) -> bool {
+                match self { $( LobeKind::$Lobe => {
+                    let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
+                    <$module::$Lobe<f32> as Lobe<f32>>::between_media(&params)
+                }, )* LobeKind::Host(_) => false }
+            }
+
             /// The color that multiplies a lobe with these parameter values.
             pub fn weight(self, values: &[f32]) -> Rgb32 {
                 match self { $( LobeKind::$Lobe => {
@@ -316,6 +369,11 @@ macro_rules! lobes {
             pub fn roughness(&self) -> S {
                 match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::roughness(l), )* AnyLobe::Host(l) => l.roughness() }
             }
+            /// See [`Lobe::relative_eta`].
+            #[inline]
+            pub fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+                match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
+            }
             /// See [`Lobe::delta`].
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
@@ -354,6 +412,21 @@ lobes! {
     microcylinder_threads::MicrocylinderThreads,
     velvet::Velvet,
     eon::Eon,
+    microfacet::Microfacet,
+    dielectric::Dielectric,
+    conductor::Conductor,
+    schlick::GeneralizedSchlick,
+    specular::Reflection,
+    specular::Refraction,
+    oren_nayar_diffuse::OrenNayarDiffuse,
+    burley::Burley,
+    metal::Metal,
+    phong::Phong,
+    ward::Ward,
+    subsurface::Subsurface,
+    signals::Holdout,
+    signals::Background,
+    signals::Debug,
 }
 
 impl LobeKind {
@@ -400,11 +473,13 @@ const LAYER: Form = Form {
     source: "Conty & Kulla 2017, §5, after Kelemen & Szirmay-Kalos 2001",
     reciprocal: true,
     build: Build::Layer,
+    note: "",
 };
 
 /// Every way to call a closure: each lobe under its own name, then wrappers and aliases. Several forms may share a
 /// name; their parameter types tell them apart.
 pub fn forms() -> impl Iterator<Item = Form> {
     let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(sheen::FORMS.iter().copied())
+    let lists = [sheen::FORMS, specular::FORMS, aliases::FORMS, &subsurface::FORMS];
+    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

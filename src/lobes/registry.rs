@@ -5,7 +5,7 @@
 //! `tests/` the ranges to try. A [`Form`] is one way to call a closure from a script: a lobe's own signature, or an
 //! alias or wrapper that expands to it.
 
-use super::LobeKind;
+use super::{LobeKind, tags};
 
 /// The type of a closure parameter, as a script writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum ParamTy {
     Vector,
     /// A surface normal, not necessarily unit.
     Normal,
-    /// One of [`ParamSpec::options`]; stored as its index.
+    /// One of [`ParamSpec::options`], stored as its index; free text where there are none.
     String,
     /// `closure color`: only in forms that wrap or layer, never a lobe's own parameter.
     Closure,
@@ -62,13 +62,13 @@ pub struct ParamSpec {
     /// Slot values when a keyword is left out, and the documented typical value of a positional parameter. Empty for
     /// closures, and for normals and vectors, whose default comes from the shading point.
     pub default: &'static [f32],
-    /// Values are clamped to this range, per channel, when a lobe is built. Infinite where there is no limit.
+    /// Lower end of the range that values are clamped to, per channel, when a lobe is built. Infinite where there is no limit.
     pub min: f32,
-    /// Lower end of the range.
-    pub max: f32,
-    /// The words a string parameter may be.
-    pub options: &'static [&'static str],
     /// Upper end of the range.
+    pub max: f32,
+    /// The words a string parameter may be; without any it is free text, stored as its number among the [`tags`].
+    pub options: &'static [&'static str],
+    /// What it does.
     pub doc: &'static str,
 }
 
@@ -98,6 +98,11 @@ impl ParamSpec {
     }
 }
 
+/// The number a string parameter is stored as: its place among the options, or among the [`tags`] where there are none.
+pub fn option_index(options: &[&str], name: &str) -> Option<usize> {
+    if options.is_empty() { Some(tags::number(name)) } else { options.iter().position(|o| *o == name) }
+}
+
 /// A lobe's declaration.
 #[derive(Debug)]
 pub struct LobeSpec {
@@ -113,6 +118,8 @@ pub struct LobeSpec {
     pub reciprocal: bool,
     /// How it takes part in a BSDF.
     pub class: LobeClass,
+    /// See [`Form::note`].
+    pub note: &'static str,
     /// What its parameter block looks like.
     pub layout: Layout,
 }
@@ -193,6 +200,8 @@ pub enum SlotSource {
     Param(usize),
     /// Fixed by the form.
     Const(&'static [f32]),
+    /// The shading point's normal.
+    Normal,
 }
 
 /// What calling a [`Form`] builds.
@@ -217,6 +226,15 @@ pub enum Build {
         /// Index of the closure parameter below it.
         base: usize,
     },
+    /// `weight * lobe`: a lobe scaled by the color parameter `weight`.
+    Tinted {
+        /// Which one.
+        kind: LobeKind,
+        /// Where its values come from.
+        args: &'static [SlotSource],
+        /// Index of the color parameter that scales it.
+        weight: usize,
+    },
     /// `layer(top, base)` of the closure parameters 0 and 1.
     Layer,
 }
@@ -236,6 +254,8 @@ pub struct Form {
     pub reciprocal: bool,
     /// What a call becomes.
     pub build: Build,
+    /// How it differs from what other renderers mean by the name: said wherever it is called. Empty if it does not.
+    pub note: &'static str,
 }
 
 impl Form {
@@ -248,7 +268,24 @@ impl Form {
             source: spec.source,
             reciprocal: spec.reciprocal,
             build: Build::Lobe { kind, args: &[] },
+            note: spec.note,
         }
+    }
+
+    /// Another name for a lobe, with parameters of its own.
+    pub const fn alias(
+        name: &'static str,
+        params: &'static [ParamSpec],
+        doc: &'static str,
+        spec: &'static LobeSpec,
+        build: Build,
+    ) -> Form {
+        Form { name, params, doc, source: spec.source, reciprocal: spec.reciprocal, build, note: "" }
+    }
+
+    /// The same form with a [`note`](Form::note).
+    pub const fn noted(self, note: &'static str) -> Form {
+        Form { note, ..self }
     }
 
     /// The parameters given by position.
@@ -312,6 +349,7 @@ macro_rules! closure {
         source: $source:literal,
         reciprocal: $rec:literal,
         class: $class:ident,
+        $( note: $note:expr, )?
     ) => {
         $(#[doc = $doc])*
         #[derive(Clone, Copy, Debug)]
@@ -337,6 +375,7 @@ macro_rules! closure {
                     source: $source,
                     reciprocal: $rec,
                     class: $crate::lobes::registry::LobeClass::$class,
+                    note: $crate::lobes::registry::or_else!($($note)?, ""),
                     layout: $crate::lobes::registry::Layout::of(PARAMS),
                 }
             };

@@ -91,6 +91,7 @@ pub(super) const FORMS: &[Form] = &[
             weight: 2,
             base: 0,
         },
+        note: "",
     },
     Form {
         name: "sheen",
@@ -109,6 +110,7 @@ pub(super) const FORMS: &[Form] = &[
                 SlotSource::Const(&[1.0]),
             ],
         },
+        note: "",
     },
 ];
 

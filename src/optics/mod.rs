@@ -1,9 +1,11 @@
-//! Numbers, vectors, frames and sampling: what lobe maths stands on. Knows no lobe.
+//! Numbers, vectors, frames, sampling and surface optics: what lobe maths stands on. Knows no lobe.
 
 pub mod dispatch;
 pub mod elementary;
 pub mod frame;
+pub mod fresnel;
 pub mod lanes;
+pub mod microfacet;
 pub mod real;
 pub mod sampling;
 pub mod vec3;

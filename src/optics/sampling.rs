@@ -24,3 +24,12 @@ pub fn uniform_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
 pub fn uniform_hemisphere_pdf<R: Real>(cos: R) -> R {
     R::select(cos.gt(R::zero()), R::c(0.5 * FRAC_1_PI), R::zero())
 }
+
+/// Two unit vectors that stand at right angles on the unit vector `axis` and on each other (Duff et al. 2017).
+pub fn around<R: Real>(axis: V3<R>) -> (V3<R>, V3<R>) {
+    let sign = R::one().copysign(axis.z);
+    let a = -R::one() / (sign + axis.z);
+    let b = axis.x * axis.y * a;
+    let t = V3::new((sign * axis.x * axis.x).mul_add(a, R::one()), sign * b, -sign * axis.x);
+    (t, V3::new(b, (axis.y * axis.y).mul_add(a, sign), -axis.y))
+}

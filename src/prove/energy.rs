@@ -213,7 +213,8 @@ impl<'a> Energy<'a> {
     /// The parameter block of a lobe that looks the same all around its normal, where all of it is known. Tints are 1.
     fn block(&self, kind: LobeKind, slots: &[Id]) -> Option<Vec<f32>> {
         let spec = kind.spec();
-        if spec.class != LobeClass::Scatter || spec.tangent_slot().is_some() {
+        // Phong's highlight is too narrow for the slices' quadrature.
+        if spec.class != LobeClass::Scatter || spec.tangent_slot().is_some() || kind == LobeKind::Phong {
             return None;
         }
         let mut block = vec![0.0; slots.len()];

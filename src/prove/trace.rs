@@ -11,6 +11,7 @@ use crate::ir::Answers;
 use crate::ir::Ty;
 use crate::ir::body::{Args, Body, Cells, ExprId, ExprKind, GlobalVar, Op, Root, Stmt, VarId};
 use crate::ir::builtins::BUILTINS;
+use crate::lobes::registry::option_index;
 use statements::MAX_OPEN_ROUNDS;
 use std::collections::HashMap;
 
@@ -337,7 +338,7 @@ impl Tracer<'_> {
     }
 
     fn option(&mut self, options: &[&str], name: Id) -> [Id; 3] {
-        let index = |text: &str| options.iter().position(|o| *o == text);
+        let index = |text: &str| option_index(options, text);
         match self.graph.node(name) {
             Node::Int(i) => {
                 let text = self.body.strings.get(i as usize).map_or("", String::as_str);

@@ -60,6 +60,12 @@ pub fn at<S: Scalar>(cos: f64) -> [S; 3] {
     [S::c((1.0 - cos * cos).max(0.0).sqrt()), S::zero(), S::c(cos)]
 }
 
+/// Off the axes, so that no azimuth is special.
+pub fn turned(cos: f64) -> [f32; 3] {
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    [(sin * 0.8) as f32, (sin * 0.6) as f32, cos as f32]
+}
+
 /// One lobe on its own, with N = +z and T = +x where it takes them.
 pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> NodeId {
     let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
@@ -84,7 +90,7 @@ pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) ->
 }
 
 /// Blocks over a lobe's whole declared range: every parameter at its lower end, default, middle and upper end in turn,
-/// and all combinations for up to three parameters; of more than eight, a few mixtures.
+/// and all combinations for up to three parameters; of more than eight, a few mixtures. Rough surfaces: [`surfaces`].
 pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     let free: Vec<&ParamSpec> = kind
         .spec()
@@ -99,19 +105,26 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
             if p.ty == ParamTy::Float {
                 let (lo, hi) = (p.min.max(0.0), p.max.min(limit));
                 vec![lo, lo + (hi - lo) * 0.1, lo + (hi - lo) * 0.4, hi]
+            } else if p.ty == ParamTy::String && p.options.is_empty() {
+                // A name is as good as any other.
+                p.default.to_vec()
             } else {
                 (p.min as i32..=p.max as i32).map(|v| v as f32).collect()
             }
         })
         .collect();
     let mut sets: Vec<Vec<f32>> = vec![vec![]];
+    let thin = choices.len() > 3;
+    if free.iter().any(|p| p.name == "distribution") {
+        return surfaces(kind);
+    }
     if choices.len() > 8 {
         // All at either end, and some mixtures.
         let mut rng = Pcg64Mcg::seed_from_u64(1);
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
         sets.push(free.iter().map(|p| p.default[0]).collect());
         sets.extend((0..5).map(|_| choices.iter().map(|c| c[rng.random_range(0..c.len())]).collect::<Vec<_>>()));
-    } else if choices.len() > 3 {
+    } else if thin {
         // One at a time, the others at their defaults; and all at either end.
         let defaults: Vec<f32> = free.iter().map(|p| p.default[0]).collect();
         sets = vec![choices.iter().map(|c| c[0]).collect(), choices.iter().map(|c| c[c.len() - 1]).collect()];
@@ -123,7 +136,7 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
             }));
         }
     }
-    for c in choices.iter().filter(|_| choices.len() <= 3) {
+    for c in choices.iter().filter(|_| !thin) {
         sets = sets.iter().flat_map(|s| c.iter().map(move |v| [s.as_slice(), &[*v]].concat())).collect();
     }
     let value = |set: &[f32], name: &str| free.iter().position(|f| f.name == name).map(|i| set[i]);
@@ -131,7 +144,31 @@ pub fn blocks(kind: LobeKind) -> Vec<Vec<f32>> {
     sets.iter().map(|set| block(kind, |p| value(set, p.name))).collect()
 }
 
-/// Whether a sheen block differs from another only in a switch its model does not look at.
+/// Blocks of a rough surface: even ones from the narrowest to the widest, and a stretched one, with both distributions;
+/// what else there is goes through its range beside them.
+fn surfaces(kind: LobeKind) -> Vec<Vec<f32>> {
+    let is_width = |p: &ParamSpec| p.name.ends_with("alpha") || p.name.starts_with("roughness_");
+    let widths = [(1e-4, 1e-4), (0.03, 0.03), (0.1, 0.1), (0.3, 0.3), (0.6, 0.6), (1.0, 1.0), (0.05, 0.4)];
+    let set = |(k, (x, y)): (usize, (f32, f32))| {
+        block(kind, |p| {
+            let t = [0.0, 1.0, 0.4, 0.1][k / 2 % 4];
+            match p.ty {
+                ParamTy::Float if is_width(p) => Some(if p.name.contains('x') { x } else { y }),
+                ParamTy::Float => Some(p.min.max(0.0) + (p.max.min(10.0) - p.min.max(0.0)) * t),
+                ParamTy::String => Some((k % 2) as f32),
+                // Black by default, so that no more than half of them transmit.
+                ParamTy::Color if kind == LobeKind::GeneralizedSchlick && p.name == "transmission_tint" => {
+                    Some((k % 2) as f32)
+                }
+                ParamTy::Int => Some((p.min + t * (p.max - p.min)).round()),
+                _ => None,
+            }
+        })
+    };
+    widths.into_iter().enumerate().map(set).collect()
+}
+
+/// Whether a block differs from another only in a switch its model does not look at.
 fn says_it_again(value: impl Fn(&str) -> Option<f32>) -> bool {
     let (Some(mode), Some(model), Some(softening)) = (value("mode"), value("model"), value("softening")) else {
         return false;

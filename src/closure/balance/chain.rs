@@ -1,7 +1,7 @@
 //! The layers above a lobe, as far as balancing asks.
 
 use super::super::walk::LobeVisit;
-use super::{Unbalanced, follows_normal_only};
+use super::Unbalanced;
 use crate::lobes::Rgb;
 use crate::optics::{Scalar, V3};
 use smallvec::SmallVec;
@@ -65,7 +65,7 @@ impl<S: Scalar> Chain<S> {
     pub fn lobe(&mut self, visit: &LobeVisit<'_, S>, normal: V3<S>, param: S) {
         let spec = visit.kind.spec();
         for open in self.open.iter_mut().filter(|o| o.in_top) {
-            open.tangent |= !follows_normal_only(visit.kind);
+            open.tangent |= visit.kind.follows_tangent(visit.values);
             if spec.normal_slot().is_some() {
                 open.mixed |= open.normal.is_some_and(|n| n != normal);
                 open.normal = Some(normal);

@@ -282,7 +282,9 @@ impl Balancer {
         let (t, b) = (sites.get(top as usize)?, sites.get(base as usize)?);
         let (t_values, varying) = known(t)?;
         let (b_values, none) = known(b)?;
-        if !follows_normal_only(t.kind) || none.is_some() || t.kind.class() != LobeClass::Scatter {
+        // A width that varies may differ from the other one.
+        let tangent = varying.is_some() && t.kind.spec().tangent_slot().is_some();
+        if tangent || t.kind.follows_tangent(&t_values) || none.is_some() || t.kind.class() != LobeClass::Scatter {
             return None;
         }
         let nodes = self.pair_nodes;
@@ -327,7 +329,7 @@ impl Balancer {
         if kind.class() == LobeClass::Delta {
             return Err(Unbalanced::Delta);
         }
-        if !follows_normal_only(kind) {
+        if kind.follows_tangent(values) {
             return Err(Unbalanced::Tangent);
         }
         if !kind.reciprocal(values) {
@@ -364,11 +366,6 @@ impl Balancer {
 
 /// More pairs of sites than this keep `min`: solving takes tens of milliseconds and up to 64 KiB each.
 pub const MAX_PAIRS: usize = 8;
-
-/// Whether f depends on the angles to the normal and between the directions alone. Of a host's lobe that is not known.
-pub(super) fn follows_normal_only(kind: LobeKind) -> bool {
-    !matches!(kind, LobeKind::Host(_)) && kind.spec().tangent_slot().is_none()
-}
 
 /// The parameter of a top that varies, and its declared range.
 struct Varying {

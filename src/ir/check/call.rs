@@ -30,7 +30,8 @@ impl<'a> Checker<'a> {
 
     /// Every way to call a closure.
     fn forms(&self) -> impl Iterator<Item = &'a Form> + use<'a> {
-        built_in().iter().chain(self.hosts)
+        // The host's first: what it takes over looks the same.
+        self.hosts.iter().chain(built_in())
     }
 
     pub(super) fn call(&mut self, name: Sym, at: Span, args: ast::Args, span: Span, wanted: Option<Ty>) -> Typed {
@@ -82,8 +83,8 @@ impl<'a> Checker<'a> {
         for index in builtins::overloads(name) {
             for (result, params) in BUILTINS[*index as usize].instances() {
                 let fits = params.len() == given.typed.len();
-                let costs = given.typed.iter().zip(&params).map(|(arg, param)| arg.ty.distance(*param));
-                let cost = costs.sum::<Option<u32>>().filter(|_| fits);
+                let costs = params.iter().enumerate().map(|(i, param)| self.distance(given, i, *param));
+                let cost = fits.then(|| costs.sum::<Option<u32>>()).flatten();
                 if cost.is_some_and(|cost| best.as_ref().is_none_or(|b| cost < b.0)) {
                     best = Some((cost?, *index, result, params));
                 }
@@ -165,7 +166,14 @@ impl<'a> Checker<'a> {
         if rest.first().is_some_and(|arg| arg.ty != Ty::String && arg.ty != Ty::Poison) {
             return None;
         }
-        form.positional().zip(&given.typed).map(|(p, arg)| arg.ty.distance(Ty::from(p.ty))).sum()
+        form.positional().enumerate().map(|(i, p)| self.distance(given, i, Ty::from(p.ty))).sum()
+    }
+
+    /// How far an argument is from a type. The literal 0 is a closure too.
+    pub(super) fn distance(&self, given: &Given, index: usize, to: Ty) -> Option<u32> {
+        let zero = || matches!(self.ast.expr(given.ids[index]).kind, ast::ExprKind::Int(0));
+        let black = || (to == Ty::Closure && zero()).then_some(2);
+        given.typed.get(index)?.ty.distance(to).or_else(black)
     }
 
     /// Explains why a call fits nothing.
@@ -202,7 +210,7 @@ impl<'a> Checker<'a> {
     fn misfit(&self, form: &Form, given: &Given) -> Option<Diagnostic> {
         for (i, param) in form.positional().enumerate() {
             let (arg, id) = (given.typed.get(i)?, given.ids[i]);
-            if arg.ty.distance(Ty::from(param.ty)).is_none() {
+            if self.distance(given, i, Ty::from(param.ty)).is_none() {
                 let message =
                     format!("`{}` of `{}` is {}, not {}", param.name, form.name, param.ty.name(), arg.ty.name());
                 let d = Diagnostic::error("E0205", self.span_of(id), message);

@@ -1,10 +1,11 @@
 //! Calls of closures, with their keyword arguments.
 
-use super::super::body::{ExprId, ExprKind, Op};
+use super::super::body::{ExprId, ExprKind, GlobalVar, Op};
 use super::super::types::Ty;
 use super::call::Given;
 use super::{Checker, Typed, suggest};
 use crate::diag::Diagnostic;
+use crate::lobes::LobeKind;
 use crate::lobes::registry::{Build, Form, ParamSpec, ParamTy, SlotSource};
 use crate::span::Span;
 use crate::syntax::ast;
@@ -24,18 +25,19 @@ impl Checker<'_> {
         if poisoned || self.diagnostics.len() > before {
             return self.poison();
         }
+        if !form.note.is_empty() {
+            let d = Diagnostic::warning("W0507", span, format!("`{}` is not quite what its name says", form.name));
+            self.diagnostics.push(d.help(form.note));
+        }
         match form.build {
-            Build::Lobe { kind, args } => {
-                let params = kind.spec().params;
-                let ids = self.sources(form, args, params, &values, span);
-                let args = self.store(ids);
-                self.push(ExprKind::Lobe(kind, args), Ty::Closure, span)
+            Build::Lobe { kind, args } => self.lobe(form, kind, args, &values, span),
+            Build::Tinted { kind, args, weight } => {
+                let lobe = self.lobe(form, kind, args, &values, span);
+                let weight = self.value(form, &values, weight, span);
+                self.op(Op::MulC, &[weight, lobe.id], Ty::Closure, span)
             }
             Build::Wrap { kind, args, weight, base } => {
-                let params = kind.spec().params;
-                let ids = self.sources(form, args, params, &values, span);
-                let args = self.store(ids);
-                let lobe = self.push(ExprKind::Lobe(kind, args), Ty::Closure, span);
+                let lobe = self.lobe(form, kind, args, &values, span);
                 let (weight, base) = (self.value(form, &values, weight, span), self.value(form, &values, base, span));
                 let top = self.op(Op::MulC, &[weight, lobe.id], Ty::Closure, span);
                 self.op(Op::Layer, &[top.id, base], Ty::Closure, span)
@@ -45,6 +47,19 @@ impl Checker<'_> {
                 self.op(Op::Layer, &[top, base], Ty::Closure, span)
             }
         }
+    }
+
+    fn lobe(
+        &mut self,
+        form: &Form,
+        kind: LobeKind,
+        sources: &[SlotSource],
+        values: &[Option<ExprId>],
+        span: Span,
+    ) -> Typed {
+        let ids = self.sources(form, sources, kind.spec().params, values, span);
+        let args = self.store(ids);
+        self.push(ExprKind::Lobe(kind, args), Ty::Closure, span)
     }
 
     /// Reads `"name", value` pairs.
@@ -60,6 +75,12 @@ impl Checker<'_> {
                 return;
             };
             let name = self.ast.name(sym);
+            if name == "label" && given.typed.get(at + 1).is_some_and(|value| value.ty == Ty::String) {
+                let d = Diagnostic::warning("W0508", at_key, "the label has no effect");
+                self.diagnostics.push(d.help("lobes are told apart by where they stand; to name a value use `debug`"));
+                at += 2;
+                continue;
+            }
             let Some(index) = form.params.iter().position(|p| p.keyword && p.name == name) else {
                 let d = Diagnostic::error("E0302", at_key, format!("`{}` has no keyword argument `{name}`", form.name));
                 let like = suggest(name, form.keywords().map(|p| p.name));
@@ -98,6 +119,7 @@ impl Checker<'_> {
             ParamTy::Int => self.op(Op::IntToFloat, &[arg.id], Ty::Float, span).id,
             ParamTy::String => {
                 if let ast::ExprKind::String(sym) = self.ast.expr(id).kind
+                    && !param.options.is_empty()
                     && !param.options.contains(&self.ast.name(sym))
                 {
                     let d = super::super::passes::needs::unknown_option(self.ast.name(sym), param.options, span);
@@ -126,6 +148,7 @@ impl Checker<'_> {
             ids.push(match source {
                 SlotSource::Param(i) => self.value(form, values, *i, span),
                 SlotSource::Const(slots) => self.slots(slots, param.ty, span),
+                SlotSource::Normal => self.push(ExprKind::Global(GlobalVar::N), Ty::Normal, span).id,
             });
         }
         ids

@@ -399,6 +399,8 @@ impl Checker<'_> {
                 }
                 _ => self.op(Op::Splat, &[a.id], to, span).id,
             },
+            // The literal 0, which stands for a black closure.
+            (Ty::Int, Ty::Closure) => self.zero(to, span),
             _ => a.id,
         }
     }

@@ -88,7 +88,7 @@ impl<'a> Checker<'a> {
         }
         let mut cost = 0;
         let mut types = Vec::new();
-        for (param, arg) in function.params.iter().zip(&given.typed) {
+        for (i, (param, arg)) in function.params.iter().zip(&given.typed).enumerate() {
             let length = match arg.ty {
                 Ty::Array(number) => self.arrays[usize::from(number)].1,
                 _ => None,
@@ -99,7 +99,7 @@ impl<'a> Checker<'a> {
                 (a, b) if a == b => 0,
                 (Ty::Int | Ty::Float, Ty::Matrix) if !param.output => 8,
                 (a, b) if param.output => a.distance(b).filter(|d| *d <= 1)?,
-                (a, b) => a.distance(b)?,
+                _ => self.distance(given, i, ty)?,
             };
             cost += distance * 4;
             types.push(ty);

@@ -45,6 +45,7 @@ const TASKS: &[&str] = &[
     "warning",
     "exit",
     "inverse",
+    "artistic_ior",
 ];
 
 /// Whether a call of `name` may become statements.
@@ -154,6 +155,19 @@ impl Checker<'_> {
                     let id = self.builtin_by_name(function, &[value.id], ty, span);
                     let var = self.kept(id, ty);
                     self.write_result(given.ids[target], at(var), ty, span);
+                }
+                self.resume();
+                Some(Typed { ty: Ty::Void, ..self.poison() })
+            }
+            ("artistic_ior", [r, g, Ty::Color, Ty::Color])
+                if [r, g].iter().all(|t| t.distance(Ty::Color).is_some()) =>
+            {
+                self.aside(given);
+                let args = vec![self.value_of(given, 0, Ty::Color), self.value_of(given, 1, Ty::Color)];
+                let outs = [self.temporary(Ty::Color), self.temporary(Ty::Color)];
+                self.deed(Task::ArtisticIor, args, outs.to_vec(), span);
+                for (target, var) in [(2, outs[0]), (3, outs[1])] {
+                    self.write_result(given.ids[target], at(var), Ty::Color, span);
                 }
                 self.resume();
                 Some(Typed { ty: Ty::Void, ..self.poison() })

@@ -15,6 +15,7 @@ use super::super::tasks::{Strings, Surroundings, Task};
 use super::super::types::Ty;
 use super::env::Env;
 use crate::globals::Globals;
+use crate::lobes::registry::option_index;
 use crate::span::Span;
 
 /// Folds a body. `known` holds, by variable, the values of parameters that are set; `answers`: what a host will
@@ -340,7 +341,7 @@ impl<'a> Folder<'a> {
 
     fn option(&self, options: &[&str], name: Cells) -> Option<usize> {
         let name = self.new.strings.get(name[0] as usize)?;
-        options.iter().position(|option| option == name)
+        option_index(options, name)
     }
 
     fn value(&self, id: ExprId) -> Option<Cells> {

@@ -1,0 +1,110 @@
+//! MaterialX's conductor: metals, from n and k.
+//!
+//! Smooth a colored mirror that whitens at the very edge; at 0.3 brushed; at 0.8 cast metal, its color deeper than the
+//! mirror's, because light that meets several facets is colored by each ([`super::rough`]).
+//!
+//! Where this departs from the source: roughness is used as the width α of the slopes; no thin film.
+
+use super::registry::{ClosureParams, LobeSpec, closure};
+use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, widths};
+use super::{Lobe, Rgb};
+use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
+use crate::albedo::{AlbedoCurve, TableSpec};
+use crate::optics::{Lift, Real, V3, fresnel};
+
+closure! {
+    /// Reflection by a metal's facets, what bounces between them included. One-sided.
+    closure "conductor_bsdf" as ConductorParams {
+        /// Shading normal.
+        normal N;
+        /// Direction that `roughness_x` is measured along.
+        vector U;
+        /// Width of the facets' slopes (α) along U.
+        float roughness_x = 0.3, in (1e-4, 1.0);
+        /// Width of the slopes across U.
+        float roughness_y = 0.3, in (1e-4, 1.0);
+        /// Index of refraction per channel (n).
+        color ior = [0.183, 0.421, 1.373], in (0.0, 500.0);
+        /// Extinction coefficient per channel (k).
+        color extinction = [3.424, 2.346, 1.77], in (0.0, 500.0);
+        /// Distribution of the slopes; "default" and "multi_ggx" are "ggx".
+        string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
+    }
+    source: "MaterialX, conductor_bsdf; Born & Wolf, §14.2; Kulla & Conty 2017",
+    reciprocal: true,
+    class: Scatter,
+}
+
+const SPEC: &LobeSpec = ConductorParams::SPEC;
+
+/// n and k of a metal that reflects `reflectivity` (at most 0.99) at normal incidence; `edge_tint` in [0, 1] tints its
+/// edge: 1 keeps the color, 0 lets it whiten late (Gulbrandsen 2014, eq. 7-9).
+pub fn artistic_ior(reflectivity: [f32; 3], edge_tint: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+    let pairs: [(f64, f64); 3] =
+        std::array::from_fn(|c| fresnel::artistic(f64::from(reflectivity[c]), f64::from(edge_tint[c])));
+    (pairs.map(|p| p.0 as f32), pairs.map(|p| p.1 as f32))
+}
+
+/// See [`ConductorParams`].
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor<S> {
+    surface: Reflector<S>,
+}
+
+/// For [`Facet::Mirror`]: the key holds n, then k.
+fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
+    Reflectance::Conductor([key[0], key[1], key[2]], [key[3], key[4], key[5]]).at(c, 1.0 - c)
+}
+
+impl<S: Real> Lobe<S> for Conductor<S> {
+    type Params = ConductorParams;
+
+    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
+        let shape = DISTRIBUTIONS[SPEC.params[6].clamp(0, values[14]?) as usize];
+        let mut key = [0.0; 8];
+        let known = values[8..14].iter().zip(&mut key).all(|(value, key)| match value {
+            Some(v) => {
+                *key = SPEC.params[4].clamp(0, *v).into();
+                true
+            }
+            None => false,
+        });
+        let facet = Facet::Mirror { reflectance, key, parts: if known { 3 } else { 0 } };
+        Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 2, 6, values), facet }))
+    }
+
+    fn follows_tangent(params: &ConductorParams) -> bool {
+        let [x, y] = widths([params.roughness_x, params.roughness_y]);
+        x != y
+    }
+
+    fn new(params: &ConductorParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+        let shape = DISTRIBUTIONS[params.distribution as usize];
+        let metal = Reflectance::Conductor(params.ior.map(S::from_f32), params.extinction.map(S::from_f32));
+        let alpha = [params.roughness_x, params.roughness_y];
+        Conductor { surface: Reflector::new(shape, alpha, metal, wo, curve.facets()) }
+    }
+
+    #[inline(always)]
+    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        self.surface.f(wi, curve.facets())
+    }
+
+    #[inline(always)]
+    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        self.surface.pdf(wi)
+    }
+
+    fn sample(&self, u: [S; 2]) -> V3<S> {
+        self.surface.sample(u)
+    }
+
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+        self.surface.albedo(w, curve.facets())
+    }
+
+    #[inline(always)]
+    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+        self.surface.albedo_bound(w, curve.facets())
+    }
+}

@@ -1,0 +1,315 @@
+//! A rough surface between two media: reflection and refraction, shared by the dielectric lobes. Not a lobe itself.
+//!
+//! With h = ω₁ + η·ω₂, ω₁ the direction outside, ω₂ the one inside and η the inside's index over the outside's,
+//! refraction is (Walter et al. 2007, eq. 21, as flux)
+//!
+//! f = (1 − F)·|ωo·h|·|ωi·h|·n²·D(h)·G₂/(μo·μi·|h|⁴),  n = η if ωi is inside, else 1,
+//!
+//! all with h as it comes: the paper's last denominator is then |h|² itself. What meets a second facet is given back
+//! nearly evenly on both sides: x·M(ωo)·M(ωi)/(π·M̄) and (1 − x)·M(ωo)·M′(ωi)/(π·M̄′), primes on the far side (Kulla &
+//! Conty 2017). Either way across carries the same flux if (1 − x)·M̄ = (1 − x′)·η²·M̄′; we take
+//! T·min(M̄, η²·M̄′) for both, T = 4η/(1 + η)². Then reflection and refraction sum to E + M from both media.
+//!
+//! A reflectance of another shape than Fresnel's, per channel, is taken at the cosine outside, from either side; what is
+//! totally reflected stays so. Second bounces are then divided as by the plain surface of that index.
+//!
+//! Limit: such a surface is not stretched, two widths count as their geometric mean. Next to the edge of total reflection
+//! the albedo of a stretched one turns so fast with azimuth and cosine that no small table keeps it below 1.
+//!
+//! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
+
+use super::Rgb;
+use super::rough::{Reflectance, even, largest, split};
+use crate::albedo::facets::{FacetTables, PARTS};
+use crate::optics::microfacet::{Facets, Shape, mirror};
+use crate::optics::{Lift, Real, V3, fresnel, sampling};
+use std::f64::consts::FRAC_1_PI;
+
+/// The index that is used for a script's: between 1/4 and 4, and no closer to 1 than 1 %, where refraction would become
+/// a delta lobe.
+pub(super) fn index(eta: f32) -> f64 {
+    let eta = f64::from(eta).clamp(0.25, 4.0);
+    if eta >= 1.0 { eta.max(1.01) } else { eta.min(0.99) }
+}
+
+fn mean<L: Real>(color: Rgb<L>) -> L {
+    (color[0] + color[1] + color[2]) * L::c(1.0 / 3.0)
+}
+
+/// A rough surface between two media, seen from one ωo. z > 0 is the outside.
+#[derive(Clone, Copy, Debug)]
+pub struct Interface<S> {
+    wo: V3<S>,
+    facets: Facets<S>,
+    /// Index of the inside over that of the outside.
+    eta: f64,
+    /// A reflectance per channel at the cosine outside; `None`: Fresnel's.
+    colored: Option<Reflectance<S>>,
+    /// The far side's over that of ωo's side.
+    far: S,
+    /// +1 if ωo is outside, −1 inside.
+    side: S,
+    reach: S,
+    proposal: S,
+    reflected: Rgb<S>,
+    refracted: Rgb<S>,
+    /// M(ωo)/(π·M̄)·x, and M(ωo)/(π·M̄′)·(1 − x).
+    again: [S; 2],
+    /// 1 − x on ωo's side, and on the other.
+    crossing: [S; 2],
+    /// Probability of an even direction, and of it being on the far side.
+    even: S,
+    across: S,
+    /// Largest channels of the tints.
+    odds: [S; 2],
+}
+
+impl<S: Real> Interface<S> {
+    /// `eta` as [`index`] gives it, the inside over the outside, and a reflectance if not Fresnel's; tints for what is reflected and refracted.
+    pub(super) fn new(
+        shape: Shape,
+        alpha: [f32; 2],
+        (eta, colored): (f64, Option<Reflectance<S>>),
+        tints: [Rgb<f32>; 2],
+        wo: V3<S>,
+        tables: &FacetTables<S>,
+    ) -> Self {
+        let alpha = [S::from_f32(even(alpha)); 2];
+        let facets = Facets::new(shape, alpha);
+        let outside = wo.z.gt(S::zero());
+        // Both are computed, because a Real cannot branch.
+        let pick = |a: S, b: S| S::select(outside, a, b);
+        let side = pick(S::one(), -S::one());
+        let (up, down) = (tables.mean_missing(false, alpha), tables.mean_missing(true, alpha));
+        let (near, far) = (pick(up, down), pick(down, up));
+        let inside_flux = S::c(eta * eta) * down;
+        let shared = S::c(4.0 * eta / ((1.0 + eta) * (1.0 + eta))) * up.min(inside_flux);
+        let tiny = S::c(1e-30);
+        let (cross_up, cross_down) = (shared / up.max(tiny), shared / inside_flux.max(tiny));
+        let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
+        let missing = tables.missing(wo, alpha) * S::c(FRAC_1_PI);
+        let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
+        let odds = [largest(reflected), largest(refracted)];
+        let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
+        let even = S::c(1.0 / FRAC_1_PI) * missing * S::select((back + on).gt(S::zero()), S::one(), S::zero());
+        Interface {
+            wo,
+            facets,
+            eta,
+            colored,
+            far: pick(S::c(eta), S::c(1.0 / eta)),
+            side,
+            reach: facets.reach(wo),
+            proposal: facets.proposal().reach(wo),
+            reflected,
+            refracted,
+            again: [missing * (S::one() - crossing[0]) / near.max(tiny), missing * crossing[0] / far.max(tiny)],
+            crossing,
+            even,
+            across: on / (back + on).max(tiny),
+            odds,
+        }
+    }
+
+    /// Whether ωi lies on ωo's side, and whether on the other.
+    #[inline(always)]
+    fn sides<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L::Mask, L::Mask) {
+        let (cos_o, cos_i) = (L::lift(self.wo.z), wi.z);
+        let lit = cos_o.abs().gt(L::zero()) & cos_i.abs().gt(L::zero());
+        let same = (cos_i * L::lift(self.side)).gt(L::zero());
+        (lit & same, lit & !same)
+    }
+
+    /// Of refraction from ωo to ωi: h, the product of the cosines times n²/|h|⁴ (0 where no facet does it), 1 − F.
+    #[inline(always)]
+    fn refraction<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L, Rgb<L>) {
+        let wo = V3::<L>::lift(self.wo);
+        let outside = L::lift(self.side).gt(L::zero());
+        let pick = |a: L, b: L| L::select(outside, a, b);
+        let out = V3::new(pick(wo.x, wi.x), pick(wo.y, wi.y), pick(wo.z, wi.z));
+        let inn = V3::new(pick(wi.x, wo.x), pick(wi.y, wo.y), pick(wi.z, wo.z));
+        // Toward the outside; what cancels is rounded once.
+        let sign = if self.eta > 1.0 { -1.0 } else { 1.0 };
+        let sum = |a: L, b: L| b.turned(sign * self.eta, a, sign);
+        let h = V3::new(sum(out.x, inn.x), sum(out.y, inn.y), sum(out.z, inn.z));
+        let (c_out, c_in) = (out.dot(h), -inn.dot(h));
+        let length2 = h.length_squared().max(L::c(1e-12));
+        let n2 = pick(L::c(self.eta * self.eta), L::one());
+        let met = c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
+        let jacobian = L::select(met, c_out * c_in * n2 / (length2 * length2), L::zero());
+        if let Some(law) = &self.colored {
+            // The cosine outside, and what it lacks of 1 from the sine: |out × h| is η·|out × in|.
+            let cos = c_out / length2.sqrt();
+            let sine2 = L::c(self.eta * self.eta) * out.cross(inn).length_squared() / length2;
+            let f = law.at(cos, sine2 / (L::one() + cos.max(L::zero())));
+            return (h, jacobian, f.map(|f| L::select(met, L::one() - f, L::zero())));
+        }
+        // 1 − F from both cosines, in any unit: nothing cancels toward the critical angle.
+        let eta = L::c(self.eta);
+        let (s, p) = (eta.mul_add(c_in, c_out), eta.mul_add(c_out, c_in));
+        let both = L::one() / s.sq().max(L::c(1e-12)) + L::one() / p.sq().max(L::c(1e-12));
+        let passed = L::select(met, L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
+        (h, jacobian, [passed; 3])
+    }
+
+    /// F of the facet that mirrors ωo to ωi.
+    #[inline(always)]
+    fn reflectance<L: Real + Lift<S>>(&self, wi: V3<L>) -> Rgb<L> {
+        let wo = V3::<L>::lift(self.wo);
+        let eta = self.eta;
+        // In double precision, because toward the critical angle the sum for g² cancels.
+        let [m, c, g2] = L::by_lane([wo.x, wo.y, wo.z, wi.x, wi.y, wi.z, L::lift(self.side)], |v| {
+            let far = if v[6] > 0.0 { eta } else { 1.0 / eta };
+            let m = (far - 1.0) * (far + 1.0);
+            let c2 = 0.25 * ((v[0] + v[3]).powi(2) + (v[1] + v[4]).powi(2) + (v[2] + v[5]).powi(2)).min(4.0);
+            [m, c2.sqrt(), c2 + m]
+        });
+        let Some(law) = &self.colored else { return [fresnel::dielectric_at(m, c, g2); 3] };
+        // 1 − c² is the square of half the difference; bent, it grows by the index.
+        let outside = L::lift(self.side).gt(L::zero());
+        let fall = L::c(0.25) * (wo - wi).length_squared();
+        let bent = (g2.max(L::zero()) * L::c(eta * eta)).sqrt();
+        let cos = L::select(outside, c, bent);
+        let sine2 = L::select(outside, fall, fall * L::c(eta * eta));
+        let f = law.at(cos, sine2 / (L::one() + cos));
+        f.map(|f| L::select(g2.gt(L::zero()), f, L::one()))
+    }
+
+    /// [`Self::reflectance`] of a facet that ωo meets at the cosine `c`, all channels alike.
+    fn grey(&self, c: S) -> S {
+        let g2 = c.mul_add(c, (self.far - S::one()) * (self.far + S::one()));
+        let Some(law) = &self.colored else {
+            return fresnel::dielectric((self.far - S::one()) * (self.far + S::one()), c);
+        };
+        let outside = self.side.gt(S::zero());
+        let cos = S::select(outside, c, (g2.max(S::zero()) * S::c(self.eta * self.eta)).sqrt());
+        let f = mean(law.at(cos, S::one() - cos));
+        S::select(g2.gt(S::zero()), f, S::one())
+    }
+
+    #[inline(always)]
+    pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+        let wo = V3::<L>::lift(self.wo);
+        let (same, other) = self.sides(wi);
+        let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
+        let h = wo + wi;
+        let mirrored = self.facets.d(h) * L::c(0.5) / shadowed;
+        let reflectance = self.reflectance(wi);
+        let (h, jacobian, passed) = self.refraction(wi);
+        let bent = jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
+        let missing = tables.missing(wi, self.facets.alpha());
+        let [back_again, on_again] = self.again.map(|a| L::lift(a) * missing);
+        std::array::from_fn(|c| {
+            let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);
+            let on = L::lift(self.refracted[c]) * passed[c].mul_add(bent, on_again);
+            L::select(same, back, L::select(other, on, L::zero()))
+        })
+    }
+
+    /// Probability of reflecting at a facet with reflectance `f`.
+    #[inline(always)]
+    fn chance<L: Real + Lift<S>>(&self, f: L) -> L {
+        let (back, on) = (f * L::lift(self.odds[0]), (L::one() - f) * L::lift(self.odds[1]));
+        L::select((back + on).gt(L::zero()), back / (back + on).max(L::c(1e-30)), L::zero())
+    }
+
+    #[inline(always)]
+    pub(super) fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let wo = V3::<L>::lift(self.wo);
+        let (same, other) = self.sides(wi);
+        let (cos_o, proposal) = (wo.z.abs(), L::lift(self.proposal));
+        let h = wo + wi;
+        let back = self.chance(mean(self.reflectance(wi))) * self.facets.mirrored_pdf(h, cos_o, proposal);
+        let (h, jacobian, passed) = self.refraction(wi);
+        let density = L::c(4.0) * jacobian * self.facets.mirrored_pdf(h, cos_o, proposal);
+        let on = (L::one() - self.chance(L::one() - mean(passed))) * density;
+        let even = L::lift(self.even);
+        let flat = even * sampling::cosine_hemisphere_pdf(wi.z.abs());
+        let across = L::lift(self.across);
+        let back = (L::one() - even).mul_add(back, flat * (L::one() - across));
+        let on = (L::one() - even).mul_add(on, flat * across);
+        L::select(same, back, L::select(other, on, L::zero()))
+    }
+
+    pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
+        let (zero, one) = (S::zero(), S::one());
+        let choose = |mask, a: V3<S>, b: V3<S>| {
+            V3::new(S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z))
+        };
+        let up = |w: V3<S>| V3::new(w.x, w.y, w.z * self.side);
+        let wo = up(self.wo);
+        let (even, u1) = split(u[1], self.even);
+        let (cross, v0) = split(u[0], self.across);
+        let flat = sampling::cosine_hemisphere([u1, v0]);
+        let flat = choose(cross, V3::new(flat.x, flat.y, -flat.z), flat);
+
+        // The azimuth of the facet is drawn first: choosing by its reflectance reuses the other number.
+        let (h, u1_left) = self.facet(wo, u[0], u1);
+        let c = wo.dot(h).max(zero);
+        let inv = one / self.far;
+        let reflects = u1_left.lt(self.chance(self.grey(c)));
+        let cos2 = one - (one - c * c) * inv * inv;
+        let cos_t = cos2.safe_sqrt();
+        let bent = h.scale(c.mul_add(inv, -cos_t)) - wo.scale(inv);
+        let mirrored = mirror(wo, h);
+        // A facet may send light where its kind of scattering is not: no direction at all.
+        let lands = (mirrored.z.gt(zero) & reflects) | (bent.z.lt(zero) & cos2.gt(zero) & !reflects);
+        let bright = choose(reflects, mirrored, bent).map(|x| S::select(lands, x, zero));
+        up(choose(even, flat, bright))
+    }
+
+    /// A unit visible facet, and a number left over to choose with: the azimuth's digits below 2⁻¹².
+    fn facet(&self, wo: V3<S>, u0: S, u1: S) -> (V3<S>, S) {
+        let fine = u0 * S::c(4096.0);
+        let left = fine - fine.floor();
+        let h = self.facets.visible(wo, [u0, u1]);
+        (h.scale(S::one() / h.length_squared().sqrt().max(S::c(1e-18))), left)
+    }
+
+    /// Best estimate of the albedo.
+    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
+        let missing = tables.missing(w, self.facets.alpha());
+        if tables.has_parts() {
+            return self.total(w, missing, self.sorted(tables.view(w)));
+        }
+        // As if it were smooth.
+        let back = self.grey(w.z.abs());
+        self.total(w, missing, [back, S::one() - back].map(|part| [part * (S::one() - missing); 3]))
+    }
+
+    /// Never below the albedo, from either side.
+    #[inline(always)]
+    pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+        let missing = tables.missing(w, self.facets.alpha());
+        if tables.has_parts() {
+            return self.total(w, missing, self.sorted(tables.bound(w)));
+        }
+        let largest = |c: usize| L::lift(self.reflected[c].max(self.refracted[c]));
+        std::array::from_fn(|c| L::select(w.z.abs().gt(L::zero()), largest(c), L::zero()))
+    }
+
+    /// Reflected and refracted parts per channel.
+    #[inline(always)]
+    fn sorted<L: Real>(&self, parts: [L; PARTS]) -> [Rgb<L>; 2] {
+        let [a, b, c, d, e, f] = parts;
+        if self.colored.is_some() { [[a, b, c], [d, e, f]] } else { [[a; 3], [b; 3]] }
+    }
+
+    #[inline(always)]
+    fn total<L: Real + Lift<S>>(&self, w: V3<L>, missing: L, [back, on]: [Rgb<L>; 2]) -> Rgb<L> {
+        let near = (w.z * L::lift(self.side)).gt(L::zero());
+        let crossing = L::select(near, L::lift(self.crossing[0]), L::lift(self.crossing[1]));
+        std::array::from_fn(|c| {
+            let (back, on) = (missing.mul_add(L::one() - crossing, back[c]), missing.mul_add(crossing, on[c]));
+            let sum = L::lift(self.reflected[c]).mul_add(back, L::lift(self.refracted[c]) * on).min(L::one());
+            L::select(w.z.abs().gt(L::zero()), sum, L::zero())
+        })
+    }
+
+    /// Index on ωo's side over that on ωi's.
+    #[inline(always)]
+    pub(super) fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let (_, other) = self.sides(wi);
+        L::select(other, L::one() / L::lift(self.far), L::one())
+    }
+}

@@ -1,0 +1,213 @@
+//! A rough reflecting surface: what microfacet, conductor and Schlick lobes share. Not a lobe itself.
+//!
+//! f = F(c)·D(h)·G₂/(4·μo·μi) + F̃·M(ωo)·M(ωi)/(π·M̄), c the cosine between direction and facet. The second term gives
+//! back what meets a second facet (Kulla & Conty 2017): M(ω) is 1 − E(ω) of the white surface, or a little less, and M̄
+//! its mean over the hemisphere, so that E + M ≤ 1 from both sides and f stays symmetric. Of light that goes on to
+//! further facets F̃ = F̄²·Ē/(1 − F̄·(1 − Ē)) comes back, F̄ the mean of F over the hemisphere, Ē = 1 − M̄. Where nothing
+//! is known of E, M is 0 and the light is lost.
+
+use super::Rgb;
+use super::registry::LobeSpec;
+use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
+use crate::optics::microfacet::{Facets, Shape, mirror};
+use crate::optics::{Lift, Real, V3, fresnel, sampling};
+use std::f64::consts::FRAC_1_PI;
+
+/// The distributions a script may name.
+pub(super) const DISTRIBUTIONS: [Shape; 4] = [Shape::Ggx, Shape::Beckmann, Shape::Ggx, Shape::Ggx];
+
+/// Widths as lobes take them: in [1e-4, 1], the smaller one at least 1/64 of the larger.
+pub(super) fn widths(alpha: [f32; 2]) -> [f32; 2] {
+    let alpha = alpha.map(|a| a.clamp(MIN_ALPHA as f32, 1.0));
+    let floor = alpha[0].max(alpha[1]) / MAX_STRETCH as f32;
+    alpha.map(|a| a.max(floor))
+}
+
+/// The one width that a surface between two media has: the geometric mean of both.
+pub(super) fn even(alpha: [f32; 2]) -> f32 {
+    let [x, y] = widths(alpha);
+    (x * y).sqrt()
+}
+
+/// The widths of a table, if both are known: the parameter `first`, which begins at `slot`, and the one after it.
+pub(super) fn known_widths(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f64; 2]> {
+    known(spec, first, slot, values).map(|alpha| widths(alpha).map(f64::from))
+}
+
+/// The same of a surface between two media.
+pub(super) fn known_width(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f64; 2]> {
+    known(spec, first, slot, values).map(|alpha| [f64::from(even(alpha)); 2])
+}
+
+fn known(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f32; 2]> {
+    let value = |k: usize| Some(spec.params[first + k].clamp(0, values[slot + k]?));
+    Some([value(0)?, value(1)?])
+}
+
+/// Whether `u` in [0, 1) falls below `p`, and `u` stretched back to [0, 1) to be used again.
+pub(super) fn split<S: Real>(u: S, p: S) -> (S::Mask, S) {
+    let first = u.lt(p);
+    let (below, above) = (u / p.max(S::c(1e-6)), (u - p) / (S::one() - p).max(S::c(1e-6)));
+    (first, S::select(first, below, above).clamp(S::zero(), S::c(0.999_999_94)))
+}
+
+/// The largest channel.
+pub(super) fn largest<S: Real>(color: Rgb<S>) -> S {
+    color[0].max(color[1]).max(color[2])
+}
+
+/// What a facet reflects.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Reflectance<S> {
+    /// All.
+    White,
+    /// n and k per channel.
+    Conductor(Rgb<S>, Rgb<S>),
+    /// F0, F90, and the exponent.
+    Schlick(Rgb<S>, Rgb<S>, S),
+}
+
+impl<S: Real> Reflectance<S> {
+    /// At the cosine `c` between direction and facet; `fall` is 1 − c with all its digits.
+    #[inline(always)]
+    pub(super) fn at<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
+        match self {
+            Reflectance::White => [L::one(); 3],
+            Reflectance::Conductor(n, k) => {
+                std::array::from_fn(|i| fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c))
+            }
+            Reflectance::Schlick(f0, f90, exponent) => {
+                let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
+                std::array::from_fn(|i| (L::lift(f90[i]) - L::lift(f0[i])).mul_add(weight, L::lift(f0[i])))
+            }
+        }
+    }
+
+    /// 2·∫ F(c)·c dc, exactly or by four Gauss points in c² (2e-3 for metals, which costs no energy).
+    fn mean(&self) -> Rgb<S> {
+        match self {
+            Reflectance::White => [S::one(); 3],
+            Reflectance::Schlick(f0, f90, p) => {
+                let share = S::c(2.0) / ((*p + S::one()) * (*p + S::c(2.0)));
+                std::array::from_fn(|i| (f90[i] - f0[i]).mul_add(share, f0[i]))
+            }
+            Reflectance::Conductor(..) => {
+                const POINTS: [(f64, f64); 4] = [
+                    (0.263_499_221_998_5, 0.173_927_422_568_7),
+                    (0.574_464_185_155_5, 0.326_072_577_431_3),
+                    (0.818_529_380_366_1, 0.326_072_577_431_3),
+                    (0.964_659_633_115_6, 0.173_927_422_568_7),
+                ];
+                let mut sum = [S::zero(); 3];
+                for (c, weight) in POINTS {
+                    let f = self.at(S::c(c), S::c(1.0 - c));
+                    for i in 0..3 {
+                        sum[i] = f[i].mul_add(S::c(weight), sum[i]);
+                    }
+                }
+                sum
+            }
+        }
+    }
+}
+
+/// A rough reflecting surface seen from one ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct Reflector<S> {
+    wo: V3<S>,
+    facets: Facets<S>,
+    reflectance: Reflectance<S>,
+    /// ℓ(ωo) of the surface and of the proposal.
+    reach: S,
+    proposal: S,
+    /// F̃/(π·M̄)·M(ωo).
+    again: Rgb<S>,
+    /// F̃.
+    kept: Rgb<S>,
+    /// Probability of a cosine-distributed direction.
+    even: S,
+}
+
+impl<S: Real> Reflector<S> {
+    pub(super) fn new(
+        shape: Shape,
+        alpha: [f32; 2],
+        reflectance: Reflectance<S>,
+        wo: V3<S>,
+        tables: &FacetTables<S>,
+    ) -> Self {
+        let alpha = widths(alpha).map(S::from_f32);
+        let facets = Facets::new(shape, alpha);
+        let missing = tables.missing(wo, alpha);
+        let mean = tables.mean_missing(false, alpha);
+        let kept = reflectance.mean().map(|f| f * f * (S::one() - mean) / (S::one() - f * mean).max(S::c(1e-6)));
+        let scale = S::c(FRAC_1_PI) * missing / mean.max(S::c(1e-30));
+        Reflector {
+            wo,
+            facets,
+            reflectance,
+            reach: facets.reach(wo),
+            proposal: facets.proposal().reach(wo),
+            again: kept.map(|k| k * scale),
+            kept,
+            even: missing * kept[0].max(kept[1]).max(kept[2]),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+        let wo = V3::<L>::lift(self.wo);
+        let h = wo + wi;
+        let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
+        let single = self.facets.d(h) * L::c(0.5) / shadowed.max(L::c(1e-18));
+        let c = L::c(0.5) * h.length_squared().sqrt();
+        // 1 − c² is the square of half the difference.
+        let fall = L::c(0.25) * (wo - wi).length_squared() / (L::one() + c);
+        let part = self.reflectance.at(c, fall);
+        let missing = tables.missing(wi, self.facets.alpha());
+        let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
+        std::array::from_fn(|c| {
+            let f = part[c].mul_add(single, L::lift(self.again[c]) * missing);
+            L::select(lit, f, L::zero())
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+        let wo = V3::<L>::lift(self.wo);
+        let facet = self.facets.mirrored_pdf(wo + wi, wo.z, L::lift(self.proposal));
+        let even = L::lift(self.even);
+        let pdf = (L::one() - even).mul_add(facet, even * sampling::cosine_hemisphere_pdf(wi.z));
+        L::select(wo.z.gt(L::zero()) & wi.z.gt(L::zero()), pdf, L::zero())
+    }
+
+    pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
+        let (even, again) = split(u[1], self.even);
+        let flat = sampling::cosine_hemisphere([again, u[0]]);
+        let bright = mirror(self.wo, self.facets.visible(self.wo, [u[0], again]));
+        V3::new(S::select(even, flat.x, bright.x), S::select(even, flat.y, bright.y), S::select(even, flat.z, bright.z))
+    }
+
+    /// Best estimate of the albedo.
+    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
+        self.total(w, tables, tables.view(w))
+    }
+
+    /// Never below the albedo.
+    #[inline(always)]
+    pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+        self.total(w, tables, tables.bound(w))
+    }
+
+    #[inline(always)]
+    fn total<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>, parts: [L; PARTS]) -> Rgb<L> {
+        let missing = tables.missing(w, self.facets.alpha());
+        let white = matches!(self.reflectance, Reflectance::White);
+        std::array::from_fn(|c| {
+            // Without parts: all that is not missing, which no reflectance exceeds.
+            let single = if white || !tables.has_parts() { L::one() - missing } else { parts[c] };
+            let sum = missing.mul_add(L::lift(self.kept[c]), single).min(L::one());
+            L::select(w.z.gt(L::zero()), sum, L::zero())
+        })
+    }
+}
