@@ -59,6 +59,10 @@ fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
 impl<S: Real> Lobe<S> for Conductor<S> {
     type Params = ConductorParams;
 
+    fn roughness(&self) -> S {
+        self.surface.roughness()
+    }
+
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[6].clamp(0, values[14]?) as usize];
         let mut key = [0.0; 8];

@@ -12,7 +12,7 @@ use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, known_width, known_widths, widths};
-use super::{Lobe, Rgb};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -60,6 +60,20 @@ use Dielectric::{Solid, Thin};
 
 impl<S: Real> Lobe<S> for Dielectric<S> {
     type Params = DielectricParams;
+
+    fn sides(&self) -> Sides {
+        match self {
+            Solid(surface) => surface.scattered_to(),
+            Thin(surface) => surface.scattered_to(),
+        }
+    }
+
+    fn roughness(&self) -> S {
+        match self {
+            Solid(surface) => surface.roughness(),
+            Thin(surface) => surface.roughness(),
+        }
+    }
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[7].clamp(0, values[15]?) as usize];

@@ -18,8 +18,8 @@
 //!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
-use super::Rgb;
 use super::rough::{Reflectance, even, largest, split};
+use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
@@ -62,6 +62,7 @@ pub struct Interface<S> {
     across: S,
     /// Largest channels of the tints.
     odds: [S; 2],
+    sides: Sides,
 }
 
 impl<S: Real> Interface<S> {
@@ -88,6 +89,7 @@ impl<S: Real> Interface<S> {
         let (cross_up, cross_down) = (shared / up.max(tiny), shared / inside_flux.max(tiny));
         let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
         let missing = tables.missing(wo, alpha) * S::c(FRAC_1_PI);
+        let sides = Sides::tinted(tints);
         let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
         let odds = [largest(reflected), largest(refracted)];
         let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
@@ -108,6 +110,7 @@ impl<S: Real> Interface<S> {
             even,
             across: on / (back + on).max(tiny),
             odds,
+            sides,
         }
     }
 
@@ -185,6 +188,15 @@ impl<S: Real> Interface<S> {
         let cos = S::select(outside, c, (g2.max(S::zero()) * S::c(self.eta * self.eta)).sqrt());
         let f = mean(law.at(cos, S::one() - cos));
         S::select(g2.gt(S::zero()), f, S::one())
+    }
+
+    /// To the sides that have a tint.
+    pub(super) fn scattered_to(&self) -> Sides {
+        self.sides
+    }
+
+    pub(super) fn roughness(&self) -> S {
+        self.facets.roughness()
     }
 
     #[inline(always)]

@@ -44,6 +44,10 @@ pub struct Metal<S> {
 impl<S: Real> Lobe<S> for Metal<S> {
     type Params = MetalParams;
 
+    fn roughness(&self) -> S {
+        Lobe::roughness(&self.metal)
+    }
+
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let mut block = values.to_vec();
         let color = |at: usize, param: usize| -> Option<[f32; 3]> {

@@ -15,7 +15,7 @@
 use super::interface::{Interface, index};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
-use super::{Lobe, Rgb};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -64,6 +64,20 @@ fn two_media(eta: f32, refract: u32) -> bool {
 
 impl<S: Real> Lobe<S> for Microfacet<S> {
     type Params = MicrofacetParams;
+
+    fn sides(&self) -> Sides {
+        match self {
+            Mirror(_) => Sides::REFLECT,
+            Glass(surface) => surface.scattered_to(),
+        }
+    }
+
+    fn roughness(&self) -> S {
+        match self {
+            Mirror(surface) => surface.roughness(),
+            Glass(surface) => surface.roughness(),
+        }
+    }
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let value = |param: usize, slot: usize| values[slot].map(|v| SPEC.params[param].clamp(0, v));

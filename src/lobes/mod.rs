@@ -71,6 +71,12 @@ impl Sides {
     pub const TRANSMIT: Sides = Sides { reflect: false, transmit: true };
     /// Both.
     pub const BOTH: Sides = Sides { reflect: true, transmit: true };
+
+    /// Those of what is reflected and of what is transmitted that has a tint.
+    fn tinted(tints: [Rgb32; 2]) -> Sides {
+        let [reflect, transmit] = tints.map(|t| t.iter().any(|x| *x > 0.0));
+        Sides { reflect, transmit }
+    }
 }
 
 /// One model of scattering, prepared for one ωo.

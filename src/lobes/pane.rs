@@ -8,8 +8,8 @@
 //! folded directions: together the white surface of [`super::rough`], whose second bounces are split likewise. Reflection
 //! and transmission sum to E + M from either side, and both sides look the same.
 
-use super::Rgb;
 use super::rough::{largest, split, widths};
+use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
@@ -50,6 +50,7 @@ pub struct Pane<S> {
     across: S,
     /// Largest channels of the tints.
     odds: [S; 2],
+    sides: Sides,
 }
 
 impl<S: Real> Pane<S> {
@@ -71,6 +72,7 @@ impl<S: Real> Pane<S> {
         let shared = reflected(m, S::c(0.5));
         let missing = tables.missing(wo, alpha);
         let scale = missing * S::c(FRAC_1_PI) / tables.mean_missing(false, alpha).max(S::c(1e-30));
+        let sides = Sides::tinted(tints);
         let tints = tints.map(|t| t.map(S::from_f32));
         let odds = tints.map(largest);
         let (back, on) = (shared * odds[0], (S::one() - shared) * odds[1]);
@@ -87,6 +89,7 @@ impl<S: Real> Pane<S> {
             even: missing * S::select((back + on).gt(S::zero()), S::one(), S::zero()),
             across: on / (back + on).max(S::c(1e-30)),
             odds,
+            sides,
         }
     }
 
@@ -96,6 +99,15 @@ impl<S: Real> Pane<S> {
         let lit = wi.z.abs().gt(L::zero()) & L::lift(self.wo.z).gt(L::zero());
         let same = (wi.z * L::lift(self.side)).gt(L::zero());
         (V3::new(wi.x, wi.y, wi.z.abs()), lit & same, lit & !same)
+    }
+
+    /// To the sides that have a tint.
+    pub(super) fn scattered_to(&self) -> Sides {
+        self.sides
+    }
+
+    pub(super) fn roughness(&self) -> S {
+        self.facets.roughness()
     }
 
     #[inline(always)]

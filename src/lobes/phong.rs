@@ -102,6 +102,10 @@ impl<S: Real> Phong<S> {
 impl<S: Real> Lobe<S> for Phong<S> {
     type Params = PhongParams;
 
+    fn roughness(&self) -> S {
+        self.place.sqrt()
+    }
+
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let spec = &PhongParams::SPEC.params[1];
         let known = values[3].map(|v| place(f64::from(spec.clamp(0, v))));

@@ -154,6 +154,10 @@ impl<S: Real> Reflector<S> {
         }
     }
 
+    pub(super) fn roughness(&self) -> S {
+        self.facets.roughness()
+    }
+
     #[inline(always)]
     pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);

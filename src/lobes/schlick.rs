@@ -13,7 +13,7 @@ use super::interface::{Interface, index};
 use super::limits::{Limits, SlotRange};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
-use super::{Lobe, Rgb};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Lift, Real, V3};
@@ -87,6 +87,20 @@ fn transmits(tint: [f32; 3]) -> bool {
 
 impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     type Params = GeneralizedSchlickParams;
+
+    fn sides(&self) -> Sides {
+        match self {
+            Coat(..) => Sides::REFLECT,
+            Glass(surface) => surface.scattered_to(),
+        }
+    }
+
+    fn roughness(&self) -> S {
+        match self {
+            Coat(surface, _) => surface.roughness(),
+            Glass(surface) => surface.roughness(),
+        }
+    }
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[9].clamp(0, values[21]?) as usize];

@@ -4,7 +4,7 @@
 
 use super::interface::index;
 use super::registry::{Build, ClosureParams, Form, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb};
+use super::{Lobe, LobeKind, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Lift, Real, V3, fresnel};
 
@@ -73,6 +73,10 @@ impl<S: Real> Reflection<S> {
 impl<S: Real> Lobe<S> for Reflection<S> {
     type Params = ReflectionParams;
 
+    fn roughness(&self) -> S {
+        S::zero()
+    }
+
     fn between_media(params: &ReflectionParams) -> bool {
         params.eta > 0.0
     }
@@ -122,6 +126,14 @@ impl<S: Real> Refraction<S> {
 
 impl<S: Real> Lobe<S> for Refraction<S> {
     type Params = RefractionParams;
+
+    fn sides(&self) -> Sides {
+        Sides::TRANSMIT
+    }
+
+    fn roughness(&self) -> S {
+        S::zero()
+    }
 
     fn between_media(_: &RefractionParams) -> bool {
         true

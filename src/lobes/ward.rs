@@ -163,6 +163,10 @@ impl<S: Real> Ward<S> {
 impl<S: Real> Lobe<S> for Ward<S> {
     type Params = WardParams;
 
+    fn roughness(&self) -> S {
+        (self.alpha[0] * self.alpha[1]).sqrt().sqrt()
+    }
+
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let alpha = widths([SPEC.params[2].clamp(0, values[6]?), SPEC.params[3].clamp(0, values[7]?)]);
         let alpha = alpha.map(f64::from);

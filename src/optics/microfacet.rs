@@ -48,6 +48,11 @@ impl<S: Real> Facets<S> {
         self.alpha
     }
 
+    /// √α of the widths' geometric mean, at most 1: the roughness users know.
+    pub fn roughness(&self) -> S {
+        (self.alpha[0] * self.alpha[1]).sqrt().sqrt().min(S::one())
+    }
+
     /// Density of facets with normal along `h` (any length), per solid angle and area of the surface.
     #[inline(always)]
     pub fn d<L: Real + Lift<S>>(&self, h: V3<L>) -> L {
