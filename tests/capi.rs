@@ -86,6 +86,11 @@ fn it_gives_what_rust_gives() {
     for (k, direction) in directions.iter().enumerate() {
         assert_eq!(bsdf.eval(*direction), Eval { f_cos: f[k], pdf: pdf[k] });
     }
+    for k in [1, 3] {
+        let mut few = [[0f32; 3]; 3];
+        ok(unsafe { oc_bsdf_eval(b, directions.as_ptr().cast(), k, few.as_mut_ptr().cast(), pdf.as_mut_ptr()) });
+        assert_eq!(few[..k], f[..k], "few are evaluated one by one, to the same bits");
+    }
     let (u, fp) = (numbers.as_ptr().cast(), f.as_mut_ptr().cast());
     ok(unsafe { oc_bsdf_sample(b, u, n, wi.as_mut_ptr().cast(), fp, pdf.as_mut_ptr(), flags.as_mut_ptr()) });
     let mut full = vec![OcSample::default(); n];
