@@ -1,6 +1,7 @@
 //! Numbers, vectors, frames, sampling and surface optics: what lobe maths stands on. Knows no lobe.
 
 pub mod elementary;
+pub mod film;
 pub mod frame;
 pub mod fresnel;
 pub mod lanes;
