@@ -90,6 +90,17 @@ impl<S: Real> Reflectance<S> {
         }
     }
 
+    /// 1 − F, with all its digits where F is close to 1.
+    #[inline(always)]
+    pub(super) fn rest<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
+        let Reflectance::Schlick(f0, f90, exponent) = self else { return self.at(c, fall).map(|f| L::one() - f) };
+        let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
+        std::array::from_fn(|i| {
+            let (f0, f90) = (L::lift(f0[i]), L::lift(f90[i]));
+            (f0 - f90).mul_add(weight, L::one() - f0).max(L::zero())
+        })
+    }
+
     /// 2·∫ F(c)·c dc, exactly or by four Gauss points in c² (2e-3 for metals, which costs no energy).
     fn mean(&self) -> Rgb<S> {
         match self {
