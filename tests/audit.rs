@@ -125,7 +125,8 @@ fn a_tree_is_what_its_script_builds() {
         let text = script(&tree, |site, slot| round % 2 == 0 && pool.varies(site, slot));
         varying += u32::from(text.contains(" + u"));
         let (checked, warnings) = overcoat::ir::compile("tree", &text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
-        assert!(warnings.is_empty(), "{warnings:?}\n{text}");
+        // Lobes that stand in for what the renderer is to do say so.
+        assert!(warnings.iter().all(|w| w.code == "W0507"), "{warnings:?}\n{text}");
         let program = checked.specialise(&[]).expect("no parameters");
         let mut again = ClosureTree::new();
         program.shade(&Globals::default(), &mut again).expect("a small tree");

@@ -231,3 +231,81 @@ fn a_host_takes_scattering_below_over() {
         assert!((albedo[1] - 0.4).abs() < 1e-6, "{closure}: {albedo:?}");
     }
 }
+
+/// The closures of stdosl.h 1.13, as it declares them.
+const STDOSL: &[&str] = &[
+    "emission()",
+    "background()",
+    "diffuse(normal N)",
+    "oren_nayar(normal N, float sigma)",
+    "translucent(normal N)",
+    "phong(normal N, float exponent)",
+    "ward(normal N, vector T, float ax, float ay)",
+    "microfacet(string distribution, normal N, vector U, float xalpha, float yalpha, float eta, int refract)",
+    "microfacet(string distribution, normal N, float alpha, float eta, int refract)",
+    "reflection(normal N, float eta)",
+    "reflection(normal N)",
+    "refraction(normal N, float eta)",
+    "transparent()",
+    "debug(string tag)",
+    "holdout()",
+    "subsurface(float eta, float g, color mfp, color albedo)",
+    "oren_nayar_diffuse_bsdf(normal N, color albedo, float roughness)",
+    "burley_diffuse_bsdf(normal N, color albedo, float roughness)",
+    "dielectric_bsdf(normal N, vector U, color reflection_tint, color transmission_tint, float roughness_x, \
+     float roughness_y, float ior, string distribution)",
+    "conductor_bsdf(normal N, vector U, float roughness_x, float roughness_y, color ior, color extinction, \
+     string distribution)",
+    "generalized_schlick_bsdf(normal N, vector U, color reflection_tint, color transmission_tint, float roughness_x, \
+     float roughness_y, color f0, color f90, float exponent, string distribution)",
+    "translucent_bsdf(normal N, color albedo)",
+    "transparent_bsdf()",
+    "subsurface_bssrdf(normal N, color albedo, color radius, float anisotropy)",
+    "sheen_bsdf(normal N, color albedo, float roughness)",
+    "uniform_edf(color emittance)",
+    "layer(closure color top, closure color base)",
+];
+
+#[test]
+fn the_standard_header_is_covered() {
+    for declared in STDOSL {
+        let same = |f: &overcoat::lobes::registry::Form| {
+            let params: Vec<String> = f.positional().map(|p| format!("{} {}", p.ty.name(), p.name)).collect();
+            format!("{}({})", f.name, params.join(", ")) == *declared
+        };
+        assert!(forms().any(|f| same(&f)), "{declared}");
+    }
+}
+
+#[test]
+fn films_color_metals_and_are_named_where_they_are_not_modelled() {
+    let seen = |thickness: u32, wo: [f32; 3]| {
+        let m = material(&format!(
+            "Ci = conductor_bsdf(N, dPdu, 0.01, 0.01, 2.5, 2.5, \"ggx\", \"thinfilm_thickness\", {thickness}, \
+             \"thinfilm_ior\", 1.6);"
+        ));
+        m.shade(&Globals::default(), wo.into()).expect("shades").albedo()
+    };
+    let up = [0.0, 0.0, 1.0];
+    let spread = |c: [f32; 3]| c[0].max(c[1]).max(c[2]) - c[0].min(c[1]).min(c[2]);
+    assert!(spread(seen(0, up)) < 1e-3, "{:?}", seen(0, up));
+    assert!(spread(seen(300, up)) > 0.05, "{:?}", seen(300, up));
+    let shift: f32 = seen(300, up).iter().zip(seen(300, [0.8, 0.0, 0.6])).map(|(a, b)| (a - b).abs()).sum();
+    assert!(shift > 0.05, "{shift}");
+    let glass = "Ci = dielectric_bsdf(N, dPdu, 1, 1, 0.1, 0.1, 1.5, \"ggx\", \"thinfilm_thickness\", 300);";
+    let shader = compile(glass);
+    assert!(shader.warnings()[0].code == "W0508" && shader.warnings()[0].message.contains("thinfilm_thickness"));
+}
+
+#[test]
+fn the_proof_knows_the_new_closures() {
+    for (script, most) in [
+        ("Ci = layer(0.5 * phong(N, 30), diffuse(N));", 1.0),
+        ("Ci = 0.5 * burley_diffuse_bsdf(N, color(0.5), 0.3) + 0.5 * ward(N, dPdu, 0.2, 0.2);", 0.85),
+        ("Ci = subsurface_bssrdf(N, 0.4, 1, 0) + 0.3 * oren_nayar_diffuse_bsdf(N, 0.5, 0.5) + holdout();", 0.56),
+    ] {
+        let report = overcoat::prove::prove(&compile(script), &overcoat::prove::Options::default()).expect("proves");
+        assert_eq!(report.verdict, overcoat::prove::Verdict::Conserves, "{script}: {report:?}");
+        assert!(report.bound.is_some_and(|b| b <= most + 1e-3), "{script}: {:?}", report.bound);
+    }
+}

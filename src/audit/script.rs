@@ -1,8 +1,8 @@
 //! A closure tree as the text of a script that builds it: what a random tree is reported as.
 
 use crate::closure::{ClosureTree, Node, NodeId};
-use crate::lobes::LobeKind;
 use crate::lobes::registry::{ParamSpec, ParamTy};
+use crate::lobes::{LobeKind, tags};
 use std::fmt::Write;
 
 /// A script whose closure is `tree`, with every number written out.
@@ -98,6 +98,7 @@ fn lobe(kind: LobeKind, values: &[f32], varies: impl Fn(usize) -> bool) -> Strin
 
 fn argument(p: &ParamSpec, slots: &[f32], varies: bool) -> String {
     match (p.ty, slots) {
+        (ParamTy::String, [x]) if p.options.is_empty() => format!("\"{}\"", tags::name(*x as usize)),
         (ParamTy::String, [x]) => format!("\"{}\"", p.options.get(p.clamp(0, *x) as usize).copied().unwrap_or("")),
         (ParamTy::Int, [x]) => format!("{}", p.clamp(0, *x) as i64),
         (ParamTy::Float, [x]) if varies => format!("{x} + u"),

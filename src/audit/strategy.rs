@@ -84,6 +84,7 @@ fn slots(p: &'static ParamSpec) -> BoxedStrategy<Vec<f32>> {
         ]
         .boxed(),
         ParamTy::Color => weight().prop_map(|w| w.to_vec()).boxed(),
+        ParamTy::String if p.options.is_empty() => Just(p.default.to_vec()).boxed(),
         ParamTy::Int | ParamTy::String => {
             prop_oneof![Just(p.default.to_vec()), (lo as i32..=hi as i32).prop_map(|x| vec![x as f32])].boxed()
         }

@@ -190,6 +190,10 @@ fn known_values(kind: LobeKind, varies: bool, rng: &mut impl Rng) -> Vec<Option<
 
 /// A number in the declared range: anywhere, close to its lower end, or at an end or the default.
 fn value(p: &ParamSpec, rng: &mut impl Rng) -> f32 {
+    if p.ty == ParamTy::String && p.options.is_empty() {
+        // A name is as good as any other.
+        return p.default.first().copied().unwrap_or(0.0);
+    }
     let (lo, hi) = (p.min.max(-10.0), p.max.min(1e3));
     if matches!(p.ty, ParamTy::Int | ParamTy::String) {
         return lo + (rng.random::<f32>() * (hi - lo + 1.0)).floor().min(hi - lo);

@@ -63,8 +63,8 @@ pub fn markdown() -> Outcome {
     );
     for (i, (title, _)) in FAMILIES.iter().enumerate() {
         let names: Vec<String> = forms().filter(|f| chapter(f) == i).map(|f| format!("`{}`", f.name)).collect();
-        let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
-        names.dedup();
+        let mut seen = std::collections::BTreeSet::new();
+        let names: Vec<&str> = names.iter().map(String::as_str).filter(|n| seen.insert(*n)).collect();
         let _ = writeln!(text, "- **{title}**: {}", names.join(", "));
     }
     for (i, (title, what)) in FAMILIES.iter().enumerate() {

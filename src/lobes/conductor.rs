@@ -3,13 +3,17 @@
 //! Smooth a colored mirror that whitens at the very edge; at 0.3 brushed; at 0.8 cast metal, its color deeper than the
 //! mirror's, because light that meets several facets is colored by each ([`super::rough`]).
 //!
-//! Where this departs from the source: roughness is used as the width α of the slopes; no thin film.
+//! A film on it shifts the color with the angle, as heat does on steel ([`crate::optics::film`]).
+//!
+//! Where this departs from the source: roughness is used as the width α of the slopes; the film is summed exactly at three
+//! wavelengths per channel.
 
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, widths};
 use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
+use crate::optics::film::Film;
 use crate::optics::{Lift, Real, V3, fresnel};
 
 closure! {
@@ -29,6 +33,10 @@ closure! {
         color extinction = [3.424, 2.346, 1.77], in (0.0, 500.0);
         /// Distribution of the slopes; "default" and "multi_ggx" are "ggx".
         string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
+        /// Thickness of a film on the metal, in nanometres; 0: none.
+        @keyword float thinfilm_thickness = 0.0, in (0.0, 2000.0);
+        /// Index of refraction of the film.
+        @keyword float thinfilm_ior = 1.5, in (1.0, 4.0);
     }
     source: "MaterialX, conductor_bsdf; Born & Wolf, §14.2; Kulla & Conty 2017",
     reciprocal: true,
@@ -51,9 +59,14 @@ pub struct Conductor<S> {
     surface: Reflector<S>,
 }
 
-/// For [`Facet::Mirror`]: the key holds n, then k.
+/// For [`Facet::Mirror`]: the key holds n, then k, then the film.
 fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
-    Reflectance::Conductor([key[0], key[1], key[2]], [key[3], key[4], key[5]]).at(c, 1.0 - c)
+    let [n0, n1, n2, k0, k1, k2, thickness, ior] = *key;
+    metal([n0, n1, n2], [k0, k1, k2], Film { thickness, ior }, thickness > 0.0).at(c, 1.0 - c)
+}
+
+fn metal<S: Real>(n: Rgb<S>, k: Rgb<S>, film: Film<S>, coated: bool) -> Reflectance<S> {
+    if coated { Reflectance::Coated(n, k, film) } else { Reflectance::Conductor(n, k) }
 }
 
 impl<S: Real> Lobe<S> for Conductor<S> {
@@ -66,12 +79,12 @@ impl<S: Real> Lobe<S> for Conductor<S> {
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let shape = DISTRIBUTIONS[SPEC.params[6].clamp(0, values[14]?) as usize];
         let mut key = [0.0; 8];
-        let known = values[8..14].iter().zip(&mut key).all(|(value, key)| match value {
-            Some(v) => {
-                *key = SPEC.params[4].clamp(0, *v).into();
-                true
-            }
-            None => false,
+        let slots = values[8..14].iter().chain(&values[15..17]).zip(&mut key).enumerate();
+        let known = slots.fold(true, |known, (i, (value, key))| {
+            // n and k, then the film.
+            let spec = &SPEC.params[[4, 4, 4, 5, 5, 5, 7, 8][i]];
+            *key = value.map_or(0.0, |v| spec.clamp(0, v).into());
+            known && value.is_some()
         });
         let facet = Facet::Mirror { reflectance, key, parts: if known { 3 } else { 0 } };
         Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 2, 6, values), facet }))
@@ -84,7 +97,9 @@ impl<S: Real> Lobe<S> for Conductor<S> {
 
     fn new(params: &ConductorParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
-        let metal = Reflectance::Conductor(params.ior.map(S::from_f32), params.extinction.map(S::from_f32));
+        let [n, k] = [params.ior, params.extinction].map(|v| v.map(S::from_f32));
+        let [thickness, ior] = [params.thinfilm_thickness, params.thinfilm_ior].map(S::from_f32);
+        let metal = metal(n, k, Film { thickness, ior }, params.thinfilm_thickness > 0.0);
         let alpha = [params.roughness_x, params.roughness_y];
         Conductor { surface: Reflector::new(shape, alpha, metal, wo, curve.facets()) }
     }

@@ -144,8 +144,8 @@ impl<S: Real> Interface<S> {
             // The cosine outside, and what it lacks of 1 from the sine: |out × h| is η·|out × in|.
             let cos = c_out / length2.sqrt();
             let sine2 = L::c(self.eta * self.eta) * out.cross(inn).length_squared() / length2;
-            let f = law.at(cos, sine2 / (L::one() + cos.max(L::zero())));
-            return (h, jacobian, f.map(|f| L::select(met, L::one() - f, L::zero())));
+            let rest = law.rest(cos, sine2 / (L::one() + cos.max(L::zero())));
+            return (h, jacobian, rest.map(|r| L::select(met, r, L::zero())));
         }
         // 1 − F from both cosines, in any unit: nothing cancels toward the critical angle.
         let eta = L::c(self.eta);

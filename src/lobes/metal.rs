@@ -29,6 +29,10 @@ closure! {
         color edge_tint = [0.8, 0.8, 0.8], in (0.0, 1.0);
         /// Distribution of the slopes; "default" and "multi_ggx" are "ggx".
         string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
+        /// Thickness of a film on the metal, in nanometres; 0: none.
+        @keyword float thinfilm_thickness = 0.0, in (0.0, 2000.0);
+        /// Index of refraction of the film.
+        @keyword float thinfilm_ior = 1.5, in (1.0, 4.0);
     }
     source: "Gulbrandsen 2014; Born & Wolf, §14.2; Kulla & Conty 2017",
     reciprocal: true,
@@ -72,10 +76,20 @@ impl<S: Real> Lobe<S> for Metal<S> {
     }
 
     fn new(params: &MetalParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
-        let MetalParams { N, U, roughness_x, roughness_y, reflectivity, edge_tint, distribution } = *params;
-        let (n, k) = artistic_ior(reflectivity, edge_tint);
-        let (ior, extinction) = (n, k);
-        let params = ConductorParams { N, U, roughness_x, roughness_y, ior, extinction, distribution };
+        let MetalParams { N, U, roughness_x, roughness_y, reflectivity, edge_tint, distribution, .. } = *params;
+        let (ior, extinction) = artistic_ior(reflectivity, edge_tint);
+        let MetalParams { thinfilm_thickness, thinfilm_ior, .. } = *params;
+        let params = ConductorParams {
+            N,
+            U,
+            roughness_x,
+            roughness_y,
+            ior,
+            extinction,
+            distribution,
+            thinfilm_thickness,
+            thinfilm_ior,
+        };
         Metal { metal: Conductor::new(&params, wo, curve) }
     }
 

@@ -9,6 +9,7 @@
 use super::Rgb;
 use super::registry::LobeSpec;
 use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
+use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
 use std::f64::consts::FRAC_1_PI;
@@ -63,6 +64,8 @@ pub(super) enum Reflectance<S> {
     White,
     /// n and k per channel.
     Conductor(Rgb<S>, Rgb<S>),
+    /// The same under a film.
+    Coated(Rgb<S>, Rgb<S>, Film<S>),
     /// F0, F90, and the exponent.
     Schlick(Rgb<S>, Rgb<S>, S),
 }
@@ -76,11 +79,26 @@ impl<S: Real> Reflectance<S> {
             Reflectance::Conductor(n, k) => {
                 std::array::from_fn(|i| fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c))
             }
+            Reflectance::Coated(n, k, film) => {
+                let film = Film { thickness: L::lift(film.thickness), ior: L::lift(film.ior) };
+                std::array::from_fn(|i| film::metal(film, L::lift(n[i]), L::lift(k[i]), c, i))
+            }
             Reflectance::Schlick(f0, f90, exponent) => {
                 let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
                 std::array::from_fn(|i| (L::lift(f90[i]) - L::lift(f0[i])).mul_add(weight, L::lift(f0[i])))
             }
         }
+    }
+
+    /// 1 − F, with all its digits where F is close to 1.
+    #[inline(always)]
+    pub(super) fn rest<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
+        let Reflectance::Schlick(f0, f90, exponent) = self else { return self.at(c, fall).map(|f| L::one() - f) };
+        let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
+        std::array::from_fn(|i| {
+            let (f0, f90) = (L::lift(f0[i]), L::lift(f90[i]));
+            (f0 - f90).mul_add(weight, L::one() - f0).max(L::zero())
+        })
     }
 
     /// 2·∫ F(c)·c dc, exactly or by four Gauss points in c² (2e-3 for metals, which costs no energy).
@@ -91,7 +109,7 @@ impl<S: Real> Reflectance<S> {
                 let share = S::c(2.0) / ((*p + S::one()) * (*p + S::c(2.0)));
                 std::array::from_fn(|i| (f90[i] - f0[i]).mul_add(share, f0[i]))
             }
-            Reflectance::Conductor(..) => {
+            Reflectance::Conductor(..) | Reflectance::Coated(..) => {
                 const POINTS: [(f64, f64); 4] = [
                     (0.263_499_221_998_5, 0.173_927_422_568_7),
                     (0.574_464_185_155_5, 0.326_072_577_431_3),

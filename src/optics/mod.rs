@@ -2,6 +2,7 @@
 
 pub mod dispatch;
 pub mod elementary;
+pub mod film;
 pub mod frame;
 pub mod fresnel;
 pub mod lanes;

@@ -1,0 +1,122 @@
+//! A thin film on a metal: the exact sum of all reflections between its two faces (Airy 1833), unpolarised.
+//!
+//! With r₁₂, r₂₃ the amplitudes at either face and β = 2π·n₂·d·cos θ₂/λ, R = |r₁₂ + r₂₃·e^{2iβ}|²/|1 + r₁₂·r₂₃·e^{2iβ}|². Each
+//! channel is the mean over three wavelengths about its own, which lets the fringes of thick films fade as they do for a broad
+//! band. R ≤ 1 whatever the film.
+
+use super::Real;
+use std::f64::consts::TAU;
+
+/// The middle of each channel, in nanometres.
+const WAVELENGTHS: [f64; 3] = [630.0, 532.0, 465.0];
+/// Wavelengths of a channel over its middle, and their weights.
+const BAND: [(f64, f64); 3] = [(0.94, 0.25), (1.0, 0.5), (1.06, 0.25)];
+
+/// A film: thickness in nanometres, index at least 1.
+#[derive(Clone, Copy, Debug)]
+pub struct Film<L> {
+    /// In nanometres.
+    pub thickness: L,
+    /// Index of refraction.
+    pub ior: L,
+}
+
+#[derive(Clone, Copy)]
+struct Complex<L>(L, L);
+
+impl<L: Real> Complex<L> {
+    fn times(self, o: Self) -> Self {
+        Complex(self.0 * o.0 - self.1 * o.1, self.0 * o.1 + self.1 * o.0)
+    }
+
+    fn plus(self, x: L) -> Self {
+        Complex(self.0 + x, self.1)
+    }
+
+    fn norm(self) -> L {
+        self.0.mul_add(self.0, self.1 * self.1)
+    }
+
+    fn over(self, o: Self) -> Self {
+        let inv = L::one() / o.norm().max(L::c(1e-30));
+        let Complex(re, im) = self.times(Complex(o.0, -o.1));
+        Complex(re * inv, im * inv)
+    }
+}
+
+/// Reflectance at the cosine `c` of a metal with index n + i·k under a film, for `channel` 0, 1, 2.
+#[inline(always)]
+pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
+    let c = c.clamp(L::c(1e-6), L::one());
+    let s2 = L::one() - c * c;
+    let n2 = film.ior.max(L::one());
+    let c2 = (L::one() - s2 / n2.sq()).safe_sqrt();
+    // q = N·cos θ₃ = √(N² − sin²θ), its parts without the difference that cancels.
+    let square = Complex(n * n - k * k, L::c(2.0) * n * k);
+    let real = square.0 - s2;
+    let modulus = real.mul_add(real, square.1.sq()).safe_sqrt();
+    let large = L::c(0.5) * (modulus + real.abs());
+    let small = L::c(0.25) * square.1.sq() / large.max(L::c(1e-30));
+    let up = real.ge(L::zero());
+    let q = Complex(L::select(up, large, small).safe_sqrt(), L::select(up, small, large).safe_sqrt());
+    let outer = [(c - n2 * c2) / (c + n2 * c2), (c2 - n2 * c) / (c2 + n2 * c)];
+    let (a, b) = (n2 * c2, Complex(q.0 * n2, q.1 * n2));
+    let inner_s = Complex(a - q.0, -q.1).over(q.plus(a));
+    let inside = Complex(square.0 * c2, square.1 * c2);
+    let inner_p = Complex(b.0 - inside.0, b.1 - inside.1).over(Complex(b.0 + inside.0, b.1 + inside.1));
+    let path = L::c(2.0) * n2 * film.thickness * c2;
+    let mut sum = L::zero();
+    for (ratio, weight) in BAND {
+        let turns = path * L::c(1.0 / (ratio * WAVELENGTHS[channel]));
+        let (sin, cos) = ((turns - turns.floor()) * L::c(TAU)).sin_cos();
+        for (outer, inner) in outer.into_iter().zip([inner_s, inner_p]) {
+            let back = inner.times(Complex(cos, sin));
+            let under = Complex(back.0 * outer, back.1 * outer).plus(L::one());
+            sum = (back.plus(outer).norm() / under.norm().max(L::c(1e-30))).mul_add(L::c(0.5 * weight), sum);
+        }
+    }
+    sum.clamp(L::zero(), L::one())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fresnel;
+    use super::*;
+
+    #[test]
+    fn a_film_of_no_thickness_is_no_film() {
+        for (n, k) in [(0.2, 3.4), (1.5, 0.0), (2.9, 3.0)] {
+            for c in [1.0, 0.6, 0.1, 1e-3] {
+                let bare = fresnel::conductor(n, k, c);
+                for ior in [1.0, 1.4, 2.2] {
+                    let seen = metal(Film { thickness: 0.0f64, ior }, n, k, c, 1);
+                    assert!((seen - bare).abs() < 1e-9, "{n} {k} {c} {ior}: {seen} for {bare}");
+                }
+                let air = metal(Film { thickness: 700.0f64, ior: 1.0 }, n, k, c, 0);
+                assert!((air - bare).abs() < 1e-9, "{air} for {bare}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quarter_wave_quenches_reflection() {
+        // n₂ = √n₃ at a quarter of the wavelength: black in the middle of the band, so at most what its edges leave.
+        let film = Film { thickness: 532.0 / (4.0 * 1.5), ior: 1.5f64 };
+        let (quenched, bare) = (metal(film, 2.25, 0.0, 1.0, 1), fresnel::conductor(2.25, 0.0, 1.0));
+        assert!(quenched < 0.005 && bare > 0.14, "{quenched} {bare}");
+    }
+
+    #[test]
+    fn single_precision_follows_and_nothing_exceeds_one() {
+        for i in 0..4000u32 {
+            let t = |m: u32| f64::from(i * m % 997) / 997.0;
+            let film = Film { thickness: 2000.0 * t(13), ior: 1.0 + 2.0 * t(29) };
+            let (n, k, c) = (0.05 + 4.0 * t(37), 6.0 * t(41), t(53));
+            let truth = metal(film, n, k, c, 2);
+            let narrow = Film { thickness: film.thickness as f32, ior: film.ior as f32 };
+            let seen = metal(narrow, n as f32, k as f32, c as f32, 2);
+            assert!((0.0..=1.0).contains(&truth), "{truth}");
+            assert!((f64::from(seen) - truth).abs() < 2e-4, "{film:?} {n} {k} {c}: {seen} for {truth}");
+        }
+    }
+}
