@@ -168,6 +168,12 @@ pub enum Op {
 }
 
 impl Op {
+    /// Whether its value is 0 or 1.
+    pub const fn is_truth(self) -> bool {
+        use Op::{EqF, EqI, GeF, GeI, GtF, GtI, LeF, LeI, LtF, LtI, NeF, NeI, NotI, TruthF, TruthI};
+        matches!(self, EqF | NeF | LtF | LeF | GtF | GeF | EqI | NeI | LtI | LeI | GtI | GeI | NotI | TruthF | TruthI)
+    }
+
     /// How many operands it has.
     pub const fn arity(self) -> usize {
         match self {
