@@ -5,6 +5,9 @@ use overcoat::{Engine, Globals, Material};
 
 const VELVET: &str = include_str!("../examples/velvet.osl");
 
+const GENERATED: &str = include_str!("../tests/corpus/osl/standard_surface.osl");
+const VARYING: &str = "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);";
+
 /// Four octaves of Perlin noise in a loop; a branch drives color and roughness.
 const NOISE: &str = "
 float fbm(point p)
@@ -61,6 +64,12 @@ fn compile_500_lines(bencher: Bencher) {
     bencher.bench(|| Engine::new().compile("long", black_box(&text)));
 }
 
+/// A generated material: 240 lines of its own after 300 of operators.
+#[divan::bench]
+fn compile_standard_surface(bencher: Bencher) {
+    bencher.bench(|| Engine::new().compile("woven", black_box(GENERATED)));
+}
+
 #[divan::bench]
 fn specialise_500_lines(bencher: Bencher) {
     let shader = Engine::new().compile("long", &long()).expect("compiles");
@@ -88,12 +97,45 @@ fn shade_velvet(bencher: Bencher) {
 
 #[divan::bench(sample_size = 1000)]
 fn shade_velvet_varying(bencher: Bencher) {
-    shade(bencher, "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);");
+    shade(bencher, VARYING);
 }
 
 #[divan::bench(sample_size = 1000)]
 fn shade_noise(bencher: Bencher) {
     shade(bencher, NOISE);
+}
+
+/// Points shaded with one call; divide by this for a point.
+const POINTS: usize = 64;
+
+fn shade_batch(bencher: Bencher, text: &str) {
+    let material = material(text);
+    let mut batch = overcoat::ir::Batch::new();
+    let points: Vec<Globals> = (0..POINTS)
+        .map(|k| {
+            let u = ((k * 97) & 255) as f32 / 256.0;
+            Globals { u, p: glam::vec3(u, 1.0 - u, 0.0), ..Globals::default() }
+        })
+        .collect();
+    bencher.counter(divan::counter::ItemsCount::new(POINTS)).bench_local(|| {
+        material.shade_batch(black_box(&points), &mut batch);
+        batch.trees().len()
+    });
+}
+
+#[divan::bench(sample_size = 50)]
+fn batch_velvet(bencher: Bencher) {
+    shade_batch(bencher, VELVET);
+}
+
+#[divan::bench(sample_size = 50)]
+fn batch_velvet_varying(bencher: Bencher) {
+    shade_batch(bencher, VARYING);
+}
+
+#[divan::bench(sample_size = 50)]
+fn batch_noise(bencher: Bencher) {
+    shade_batch(bencher, NOISE);
 }
 
 /// From a point to a BSDF: the tree and its preparation for one direction.

@@ -21,7 +21,7 @@ use crate::closure::{
     flatten, flatten_into,
 };
 use crate::diag::Diagnostic;
-use crate::ir::{self, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
+use crate::ir::{self, Batch, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
 use crate::lobes;
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
 use crate::lobes::registry::{Build, Form};
@@ -424,6 +424,24 @@ impl Material {
         let tables = Tables { curves, balance: balance.as_ref() };
         flatten_into(tree, &globals, V3::from_f32(wo.to_array()), self.engine().layering, tables, bsdf)?;
         shaded.map(|()| &*bsdf)
+    }
+
+    /// The closure trees at many points, several of them worked out side by side: less work per point than
+    /// [`tree`](Self::tree), and the same trees bit for bit. Each point's `i` is taken as it is; set it to −ωo if
+    /// [`bsdf`](Self::bsdf) is to follow.
+    pub fn shade_batch(&self, points: &[Globals], batch: &mut Batch) {
+        self.inner.program.shade_batch(points, batch);
+    }
+
+    /// The BSDF of a whole tree of this material – one of a batch – at its point, seen from −`globals.i`: what
+    /// [`shade`](Self::shade) gives there.
+    ///
+    /// # Errors
+    /// If the tree goes beyond a budget.
+    pub fn bsdf(&self, tree: &ClosureTree, globals: &Globals) -> Result<Bsdf<'_>, ShadeError> {
+        let tables = Tables { curves: &self.inner.tables.curves, balance: self.inner.tables.balance.as_ref() };
+        let wo = V3::from_f32((-globals.i).to_array());
+        Ok(flatten(tree, globals, wo, self.engine().layering, tables)?)
     }
 
     /// [`shade`](Self::shade) in double precision, with the reference tier's albedos. They are baked on the first call

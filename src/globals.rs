@@ -26,6 +26,30 @@ pub struct Globals {
     pub time: f32,
     /// The ray hit the side the surface's own normal points away from.
     pub backfacing: bool,
+    /// How the point differs from those that the neighbouring pixels show. Read only if the host says that it gives
+    /// derivatives.
+    pub differentials: Differentials,
+}
+
+/// What changes by one pixel to the right (`x`) and one pixel down (`y`).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Differentials {
+    /// Of the position.
+    pub dpdx: Vec3,
+    /// Of the position, downward.
+    pub dpdy: Vec3,
+    /// Of the direction the ray travels.
+    pub didx: Vec3,
+    /// Of the direction the ray travels, downward.
+    pub didy: Vec3,
+    /// Of the first surface parameter.
+    pub dudx: f32,
+    /// Of the first surface parameter, downward.
+    pub dudy: f32,
+    /// Of the second surface parameter.
+    pub dvdx: f32,
+    /// Of the second surface parameter, downward.
+    pub dvdy: f32,
 }
 
 impl Default for Globals {
@@ -42,6 +66,7 @@ impl Default for Globals {
             dpdv: Vec3::Y,
             time: 0.0,
             backfacing: false,
+            differentials: Differentials::default(),
         }
     }
 }

@@ -71,4 +71,4 @@ pub mod span;
 pub mod syntax;
 
 pub use engine::{Engine, Error, Material, OwnedBsdf, Scratch, Shader};
-pub use globals::Globals;
+pub use globals::{Differentials, Globals};

@@ -58,3 +58,23 @@ fn shading_evaluating_and_sampling_leave_the_heap_alone() {
         assert_eq!(count, 0, "{script}");
     }
 }
+
+#[test]
+fn batches_leave_the_heap_alone_once_they_have_grown() {
+    let varying = "float x = 0; for (int i = 0; i < 9 * u; i++) if (v < 0.5) x += noise(i * P); Ci = x * diffuse(N);";
+    for script in ["Ci = sheen(diffuse(N), N, 1, 0.3);", EIGHT_LOBES, varying] {
+        let shader = Engine::new().compile("stack", script).expect("compiles");
+        let material = shader.material(&[]).expect("specialises");
+        let at = |k: usize| Globals { u: 0.03 * k as f32, v: (k % 2) as f32, ..Globals::default() };
+        let points: Vec<Globals> = (0..30).map(at).collect();
+        let mut batch = overcoat::ir::Batch::new();
+        material.shade_batch(&points, &mut batch);
+        let count = allocations(|| {
+            for k in 0..10 {
+                material.shade_batch(&points[k..], &mut batch);
+                material.shade_batch(&points[k..], &mut batch);
+            }
+        });
+        assert_eq!(count, 0, "{script}");
+    }
+}

@@ -104,6 +104,19 @@ impl Host for Answering {
             _ => None,
         }
     }
+    fn attribute_element(&self, _: &str, name: &str, index: usize, ty: Ty, _: &Globals) -> Option<Value> {
+        match (name, ty) {
+            ("weights", Ty::Float) if index < 16 => Some(Value::Float(index as f32)),
+            ("names", Ty::String) if index < 2 => Some(Value::String(["a", "b"][index].to_owned())),
+            _ => None,
+        }
+    }
+    fn texture_info(&self, name: &str, what: &str, index: usize, ty: Ty) -> Option<Value> {
+        match (name, what, ty) {
+            ("a.png", "resolution", Ty::Int) if index < 2 => Some(Value::Int([640, 480][index])),
+            _ => None,
+        }
+    }
     fn is_ray(&self, kind: &str, _: &Globals) -> bool {
         kind == "shadow"
     }
@@ -156,6 +169,42 @@ fn hosts_answer() {
         "printf(\"%g %s\\n\", u, \"x\"); for (int i = 0; i < 2; i++) warning(\"w%d\", i); if (u > 1) error(\"e\"); vector r = 1;",
     );
     assert_eq!(*host.0.lock().expect("unpoisoned"), ["Print 0.25 x\n", "Warning w0", "Warning w1"]);
+}
+
+#[test]
+fn hosts_answer_in_parts() {
+    let engine = Engine::new().host(Answering::default());
+    let globals = Globals::default();
+    let v = |code: &str| normal(&engine, &format!("surface s() {{ {code} Ci = diffuse(r); }}"), &globals);
+    assert_eq!(v("float a = 9; int f = getattribute(\"weights\", 3, a); vector r = vector(f, a, 0);"), [1.0, 3.0, 0.0]);
+    assert_eq!(
+        v("float a = 9; int f = getattribute(\"x\", \"weights\", 16, a); vector r = vector(f, a, 0);"),
+        [0.0, 9.0, 0.0]
+    );
+    assert_eq!(
+        v("float a[3]; int f = getattribute(\"weights\", a); vector r = vector(f, a[1], a[2]);"),
+        [1.0, 1.0, 2.0]
+    );
+    assert_eq!(
+        v("matrix m; int f = getattribute(\"weights\", m); vector r = vector(f, m[1][0], m[3][3]);"),
+        [1.0, 4.0, 15.0]
+    );
+    assert_eq!(
+        v("string a[2]; int f = getattribute(\"names\", a); vector r = vector(f, a[1] == \"b\", 0);"),
+        [1.0, 1.0, 0.0]
+    );
+    assert_eq!(
+        v("string a[3]; int f = getattribute(\"names\", a); vector r = vector(f, a[1] == \"\", 0);"),
+        [0.0, 1.0, 0.0]
+    );
+    assert_eq!(
+        v("int a[2]; int f = gettextureinfo(\"a.png\", \"resolution\", a); vector r = vector(f, a[0], a[1]);"),
+        [1.0, 640.0, 480.0]
+    );
+    assert_eq!(
+        v("int a = 7; int f = gettextureinfo(\"b.png\", \"channels\", a); vector r = vector(f, a, 0);"),
+        [0.0, 7.0, 0.0]
+    );
 }
 
 /// What a host says nothing about is settled before shading.

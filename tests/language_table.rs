@@ -15,10 +15,18 @@ fn names(folder: &Path) -> BTreeSet<String> {
 #[test]
 fn every_feature_has_a_test_that_shows_it() {
     let text = std::fs::read_to_string(root().join("docs/language.md")).expect("the document");
-    let tests: String = ["language", "language_host", "language_cli", "language_values", "language_more"]
-        .iter()
-        .map(|name| std::fs::read_to_string(root().join(format!("tests/{name}.rs"))).expect("a test file"))
-        .collect();
+    let tests: String = [
+        "language",
+        "language_host",
+        "language_cli",
+        "language_values",
+        "language_more",
+        "language_derivatives",
+        "language_batch",
+    ]
+    .iter()
+    .map(|name| std::fs::read_to_string(root().join(format!("tests/{name}.rs"))).expect("a test file"))
+    .collect();
     let mut shown = BTreeSet::new();
     let mut rows = 0;
     for line in text.lines().filter(|l| l.starts_with("| ")).skip(1) {

@@ -1,9 +1,22 @@
-//! Any text is compiled, specialised and shaded, or an error: `cargo +nightly fuzz run front_end ../tests/corpus/osl`.
+//! Any text is compiled, specialised and shaded, alone and side by side with the same result, or an error:
+//! `cargo +nightly fuzz run front_end ../tests/corpus/osl`.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use overcoat::syntax::Limits;
-use overcoat::{Engine, Globals};
+use overcoat::closure::ClosureTree;
+use overcoat::ir::{Batch, Host, Subject, compile_with};
+use overcoat::syntax::{Limits, Options};
+use overcoat::{Differentials, Globals};
+use std::sync::Arc;
+
+/// Says that it answers everything, derivatives too.
+struct Answering;
+
+impl Host for Answering {
+    fn answers(&self, _: Subject) -> bool {
+        true
+    }
+}
 
 fuzz_target!(|text: &str| {
     // Small budgets: what takes long is an error soon.
@@ -14,12 +27,22 @@ fuzz_target!(|text: &str| {
         iterations: 1 << 10,
         ..Limits::default()
     };
-    match Engine::new().limits(limits).compile("fuzz.osl", text) {
-        Err(e) => drop(e.to_string()),
-        Ok(shader) => {
-            if let Ok(program) = shader.material(&[]) {
-                let _ = program.tree(&Globals::default());
-            }
+    let options = Options { limits, ..Options::default() };
+    let Ok((shader, _)) = compile_with("fuzz.osl", text, &[], &options, Some(Arc::new(Answering))) else { return };
+    let Ok(program) = shader.specialise(&[]) else { return };
+    let at = |u: f32| Globals {
+        u,
+        v: 0.3,
+        differentials: Differentials { dudx: 0.1, dvdy: 0.2, ..Differentials::default() },
+        ..Globals::default()
+    };
+    let points = [at(0.0), at(0.7), at(-3.0)];
+    let mut batch = Batch::new();
+    program.shade_batch(&points, &mut batch);
+    for (point, found) in points.iter().zip(batch.trees()) {
+        let mut tree = ClosureTree::new();
+        if program.shade(point, &mut tree).is_ok() {
+            assert_eq!(format!("{found:?}"), format!("{tree:?}"));
         }
     }
 });

@@ -207,7 +207,8 @@ pub const CODES: &[Code] = &[
     code(
         "W0506",
         "a function is not quite what its name says",
-        "The function runs, but not quite as its name says: derivatives are zero, because points are shaded one by one.",
+        "The function runs, but not quite as its name says: derivatives are zero where the\n\
+         host gives none.",
     ),
     code(
         "W0702",

@@ -49,7 +49,7 @@ pub struct Root {
 }
 
 macro_rules! globals {
-    ($( $name:ident $text:literal $ty:ident $read:expr ),* $(,)?) => {
+    ($( $name:ident $text:literal $ty:ident |$g:ident| $read:expr ),* $(,)?) => {
         /// What the host tells about the shading point, as scripts name it.
         #[allow(missing_docs)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -72,7 +72,7 @@ macro_rules! globals {
             /// Its value at a point.
             #[inline]
             pub fn read(self, globals: &Globals) -> Cells {
-                match self { $( GlobalVar::$name => ($read as fn(&Globals) -> Cells)(globals) ),* }
+                match self { $( GlobalVar::$name => { let $g = globals; $read } ),* }
             }
         }
     };
@@ -89,6 +89,14 @@ globals! {
     DPdv "dPdv" Vector |g| g.dpdv.to_array().map(f32::to_bits),
     Time "time" Float |g| [g.time.to_bits(), 0, 0],
     Backfacing "backfacing()" Int |g| [u32::from(g.backfacing), 0, 0],
+    DPdx "Dx(P)" Vector |g| g.differentials.dpdx.to_array().map(f32::to_bits),
+    DPdy "Dy(P)" Vector |g| g.differentials.dpdy.to_array().map(f32::to_bits),
+    DIdx "Dx(I)" Vector |g| g.differentials.didx.to_array().map(f32::to_bits),
+    DIdy "Dy(I)" Vector |g| g.differentials.didy.to_array().map(f32::to_bits),
+    Dudx "Dx(u)" Float |g| [g.differentials.dudx.to_bits(), 0, 0],
+    Dudy "Dy(u)" Float |g| [g.differentials.dudy.to_bits(), 0, 0],
+    Dvdx "Dx(v)" Float |g| [g.differentials.dvdx.to_bits(), 0, 0],
+    Dvdy "Dy(v)" Float |g| [g.differentials.dvdy.to_bits(), 0, 0],
 }
 
 impl GlobalVar {
@@ -160,6 +168,12 @@ pub enum Op {
 }
 
 impl Op {
+    /// Whether its value is 0 or 1.
+    pub const fn is_truth(self) -> bool {
+        use Op::{EqF, EqI, GeF, GeI, GtF, GtI, LeF, LeI, LtF, LtI, NeF, NeI, NotI, TruthF, TruthI};
+        matches!(self, EqF | NeF | LtF | LeF | GtF | GeF | EqI | NeI | LtI | LeI | GtI | GeI | NotI | TruthF | TruthI)
+    }
+
     /// How many operands it has.
     pub const fn arity(self) -> usize {
         match self {

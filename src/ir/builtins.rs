@@ -33,8 +33,25 @@ pub enum Eval {
     Noise(Option<usize>, Repeats),
     /// Reads the shading point.
     Global(GlobalVar),
+    /// How its argument changes from pixel to pixel; zero unless [`derive`](super::passes::derive) has gone over it.
+    Derivative(Slope),
     /// a·(1−x) + b·x of closures.
     MixClosures,
+}
+
+/// What is asked about how a value changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slope {
+    /// By one pixel to the right (0) or down (1).
+    Along(usize),
+    /// The root of the sum of both squares.
+    Width,
+    /// Of a position: the area that a pixel covers.
+    Area,
+    /// Of a position: the cross product of both.
+    Normal,
+    /// A step, as wide as its arguments change.
+    Step,
 }
 
 /// Whether a noise takes periods after its coordinates.
@@ -50,7 +67,8 @@ pub enum Repeats {
 pub struct Builtin {
     /// What scripts call.
     pub name: &'static str,
-    sig: &'static str,
+    /// Result and arguments, a letter each.
+    pub sig: &'static str,
     /// What it does.
     pub eval: Eval,
 }
@@ -103,23 +121,23 @@ impl Builtin {
     fn noise(&self, kind: Option<usize>, repeats: Repeats, n: usize, args: &[Cells]) -> Cells {
         let named = usize::from(kind.is_none());
         let kind = kind.unwrap_or_else(|| args.first().map_or(0, |a| f32::from_bits(a[0]) as usize));
-        let mut numbers = [0.0; 8];
+        let mut numbers = [[0.0]; 8];
         let mut count = 0;
         for (letter, arg) in self.sig.bytes().skip(1).zip(args).skip(named) {
             for cell in &arg[..if letter == b'p' { 3 } else { 1 }] {
-                numbers[count] = f32::from_bits(*cell);
+                numbers[count] = [f32::from_bits(*cell)];
                 count += 1;
             }
         }
         let dimensions = if repeats == Repeats::Periodic { count / 2 } else { count };
-        let mut at = noise::At { x: [0.0; 4], n: dimensions, period: [0.0; 4] };
+        let mut at = noise::At { x: [[0.0]; 4], n: dimensions, period: [[0.0]; 4] };
         at.x[..dimensions].copy_from_slice(&numbers[..dimensions]);
         if repeats == Repeats::Periodic {
             at.period[..dimensions].copy_from_slice(&numbers[dimensions..count]);
         }
         let mut out = [0; 3];
         for (channel, cell) in out.iter_mut().enumerate().take(n) {
-            *cell = noise::noise(kind, &at, channel as u32).to_bits();
+            *cell = noise::noise(kind, &at, channel as u32)[0].to_bits();
         }
         out
     }
@@ -159,7 +177,8 @@ impl Builtin {
             Eval::I3(f) => [f(int(0), int(1), int(2)) as u32, 0, 0],
             Eval::All(f) => f(args),
             Eval::Noise(kind, repeats) => self.noise(kind, repeats, n, args),
-            Eval::Global(_) | Eval::MixClosures => [0; 3],
+            Eval::Derivative(Slope::Step) => scalar(aastep(arg(0, 0), arg(1, 0), 0.0, arg(2, 0))),
+            Eval::Global(_) | Eval::MixClosures | Eval::Derivative(_) => [0; 3],
         }
     }
 }
@@ -168,7 +187,7 @@ const fn line(name: &'static str, sig: &'static str, eval: Eval) -> Builtin {
     Builtin { name, sig, eval }
 }
 
-use Eval::{All, F1, F2, F3, I2, I3, Noise};
+use Eval::{All, Derivative, F1, F2, F3, I2, I3, Noise};
 use Repeats::{Never, Periodic};
 
 /// Every overload. The index of a line is its number in the program.
@@ -303,12 +322,15 @@ pub static BUILTINS: &[Builtin] = &[
             cells(rotate(triple(a, 0), float(a, 1), from, minus(to, from)))
         }),
     ),
-    line("Dx", "gg", F1(|_| 0.0)),
-    line("Dy", "gg", F1(|_| 0.0)),
+    line("Dx", "gg", Derivative(Slope::Along(0))),
+    line("Dy", "gg", Derivative(Slope::Along(1))),
     line("Dz", "gg", F1(|_| 0.0)),
-    line("filterwidth", "gg", F1(|_| 0.0)),
-    line("area", "fp", All(|_| scalar(0.0))),
-    line("aastep", "fff", F2(|edge, x| if x < edge { 0.0 } else { 1.0 })),
+    line("filterwidth", "gg", Derivative(Slope::Width)),
+    line("area", "fp", Derivative(Slope::Area)),
+    line("calculatenormal", "vp", Derivative(Slope::Normal)),
+    line("aastep", "fff", Derivative(Slope::Step)),
+    line("aastep", "ffff", Derivative(Slope::Step)),
+    line("aastep", "fffff", All(|a| scalar(aastep(float(a, 0), float(a, 1), float(a, 2), float(a, 3))))),
     line("blackbody", "cf", All(|a| cells(color::blackbody(float(a, 0))))),
     line("wavelength_color", "cf", All(|a| cells(color::wavelength(float(a, 0))))),
     line("distance", "fppp", All(|a| scalar(to_segment(triple(a, 0), triple(a, 1), triple(a, 2))))),
@@ -335,7 +357,6 @@ pub const CONSTANTS: &[(&str, f32)] = &[
 /// Functions of OSL that are not there, and why.
 pub const UNSUPPORTED: &[(&str, &str)] = &[
     ("bump", "it moves points; compute a normal and give it to the closures"),
-    ("calculatenormal", "it needs derivatives; use `N`"),
     ("dict_find", "dictionaries are not read"),
     ("dict_next", "dictionaries are not read"),
     ("dict_value", "dictionaries are not read"),
@@ -343,28 +364,31 @@ pub const UNSUPPORTED: &[(&str, &str)] = &[
     ("environment", "materials do not look up the surroundings; the renderer lights them"),
     ("exit", "use `return`"),
     ("fprintf", "scripts write no files; use `printf`"),
-    ("fresnel", "its four results depend on the renderer's conventions; use a dielectric closure"),
     ("getmessage", "messages between shaders need a shading network"),
-    ("gettextureinfo", "the host gives colors of pictures only"),
     ("pointcloud_get", "point clouds are not read"),
     ("pointcloud_search", "point clouds are not read"),
     ("pointcloud_write", "point clouds are not written"),
     ("random", "results would differ from render to render; use `cellnoise` or `hashnoise`"),
-    ("regex_match", "regular expressions are not there; use `startswith`, `endswith`, `split`"),
+    (
+        "regex_match",
+        "regular expressions are not there, to keep the library lean; use `startswith`, `endswith`, `split`",
+    ),
     ("regex_search", "regular expressions are not there; use `startswith`, `endswith`, `split`"),
     ("setmessage", "messages between shaders need a shading network"),
-    ("splineinverse", "only `spline` is there"),
     ("surfacearea", "the area of a light is the renderer's business"),
     ("texture3d", "only `texture` is there"),
     ("trace", "materials send no rays"),
     ("transformu", "units are not known"),
 ];
 
-/// What is said about a function that is not quite what its name says.
-pub fn warning(name: &str) -> Option<&'static str> {
+/// What is said about a function that is not quite what its name says. `given`: the host gives derivatives.
+pub fn warning(name: &str, given: bool) -> Option<&'static str> {
     match name {
-        "Dx" | "Dy" | "Dz" | "filterwidth" | "area" => Some("derivatives are zero here: points are shaded one by one"),
-        "aastep" => Some("derivatives are zero here: `aastep` is `step`"),
+        "Dz" => Some("derivatives along the view are zero here: surfaces have no depth"),
+        "Dx" | "Dy" | "filterwidth" | "area" | "calculatenormal" if !given => {
+            Some("derivatives are zero here: the host gives none")
+        }
+        "aastep" if !given => Some("derivatives are zero here: `aastep` is a plain step"),
         _ => None,
     }
 }
@@ -401,6 +425,19 @@ fn power(x: f32, y: f32) -> f32 {
     } else {
         let p = x.powf(y);
         if p.is_nan() && !x.is_nan() && !y.is_nan() { 0.0 } else { p.clamp(-f32::MAX, f32::MAX) }
+    }
+}
+
+/// A step filtered over as far as its arguments change (stdosl.h).
+fn aastep(edge: f32, x: f32, change_of_edge: f32, change_of_x: f32) -> f32 {
+    let width = change_of_edge.abs() + change_of_x.abs();
+    let start = edge - 0.5 * width;
+    if x <= start {
+        0.0
+    } else if x >= edge + 0.5 * width {
+        1.0
+    } else {
+        (x - start) / width
     }
 }
 

@@ -35,6 +35,9 @@ pub struct Lookup<'a> {
     pub interpolation: &'a str,
     /// The color space the picture is said to be in; empty: by its file.
     pub colorspace: &'a str,
+    /// How s and t change by one pixel to the right, then how they change by one pixel down: as the script says, or as
+    /// they follow from [`Globals::differentials`] for a host that gives these; else 0.
+    pub changes: [[f32; 2]; 2],
 }
 
 /// What scripts ask about.
@@ -44,10 +47,12 @@ pub enum Subject {
     Spaces,
     /// `getattribute`, `raytype`, `isconnected`
     Attributes,
-    /// `texture`
+    /// `texture`, `gettextureinfo`
     Textures,
     /// `printf`, `warning`, `error`
     Speech,
+    /// `Dx`, `filterwidth`, `calculatenormal`: whether [`Globals::differentials`] is filled in.
+    Derivatives,
 }
 
 /// What the host at hand, if any, answers at all.
@@ -57,7 +62,7 @@ pub(crate) struct Answers(u8);
 impl Answers {
     /// Of a host.
     pub fn of(host: Option<&dyn Host>) -> Answers {
-        let all = [Subject::Spaces, Subject::Attributes, Subject::Textures, Subject::Speech];
+        let all = [Subject::Spaces, Subject::Attributes, Subject::Textures, Subject::Speech, Subject::Derivatives];
         let known = |subject: &Subject| host.is_some_and(|host| host.answers(*subject));
         Answers(all.iter().filter(|s| known(s)).map(|s| 1 << *s as u8).sum())
     }
@@ -70,10 +75,10 @@ impl Answers {
 
 /// Answers to the questions of scripts; every one has a plain answer by default. Called from any thread.
 pub trait Host: Send + Sync {
-    /// Whether it says anything about a subject. What it says nothing about is settled before shading.
+    /// Whether it says anything about a subject. What it says nothing about is settled before shading. By default all
+    /// but derivatives.
     fn answers(&self, subject: Subject) -> bool {
-        let _ = subject;
-        true
+        subject != Subject::Derivatives
     }
 
     /// The matrix from `space` to the space that `P` and `N` are in, rows first, points as rows on its left. `None`: no
@@ -86,6 +91,19 @@ pub trait Host: Send + Sync {
     /// The attribute `name` of the object called `object` (empty: the one being shaded), as a `ty`.
     fn attribute(&self, object: &str, name: &str, ty: Ty, globals: &Globals) -> Option<Value> {
         let _ = (object, name, ty, globals);
+        None
+    }
+
+    /// Element `index` of an attribute that is an array or a matrix, as a `ty`.
+    fn attribute_element(&self, object: &str, name: &str, index: usize, ty: Ty, globals: &Globals) -> Option<Value> {
+        let _ = (object, name, index, ty, globals);
+        None
+    }
+
+    /// What `gettextureinfo` asks of a picture – `resolution`, `channels`, `exists`, … –, element `index` of it, as a
+    /// `ty`.
+    fn texture_info(&self, name: &str, what: &str, index: usize, ty: Ty) -> Option<Value> {
+        let _ = (name, what, index, ty);
         None
     }
 

@@ -125,18 +125,18 @@ impl Program {
             }
             Instr::Noise { kind, dimensions, periodic, width, dst, args } => {
                 let n = dimensions as usize;
-                let mut at = noise::At { x: [0.0; 4], n, period: [0.0; 4] };
+                let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
                 let regs = &self.args[args as usize..];
                 for (x, reg) in at.x.iter_mut().zip(&regs[..n]) {
-                    *x = f32::from_bits(cells[*reg as usize]);
+                    *x = [f32::from_bits(cells[*reg as usize])];
                 }
                 if periodic {
                     for (period, reg) in at.period.iter_mut().zip(&regs[n..2 * n]) {
-                        *period = f32::from_bits(cells[*reg as usize]);
+                        *period = [f32::from_bits(cells[*reg as usize])];
                     }
                 }
                 for channel in 0..u32::from(width) {
-                    cells[(dst + channel) as usize] = noise::noise(kind as usize, &at, channel).to_bits();
+                    cells[(dst + channel) as usize] = noise::noise(kind as usize, &at, channel)[0].to_bits();
                 }
             }
             _ => {}

@@ -5,6 +5,7 @@
 //! reads is dropped, and what remains is a list of register instructions that [`Program::shade`] runs at a point.
 //! This module knows closures by their signatures only; what a lobe does with light is never seen here.
 
+mod batch;
 pub(crate) mod body;
 pub(crate) mod builtins;
 mod check;
@@ -19,7 +20,9 @@ mod program;
 mod shader;
 pub(crate) mod tasks;
 mod types;
+mod wide;
 
+pub use batch::Batch;
 pub use body::GlobalVar;
 pub(crate) use host::Answers;
 pub use host::{Host, Lookup, Speech, Subject};
@@ -55,8 +58,12 @@ pub fn compile_with(
     host: Option<Arc<dyn Host>>,
 ) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
     let ast = crate::syntax::parse_with(name, source, options).map_err(|(d, sources)| placed(d, &sources))?;
-    match check::check(name, &ast, hosts, &options.limits) {
-        Ok((checked, warnings)) => Ok((CheckedShader { host, ..checked }, placed(warnings, &ast.sources))),
+    let answers = Answers::of(host.as_deref());
+    match check::check(name, &ast, hosts, &options.limits, answers) {
+        Ok((checked, warnings)) => {
+            let (body, shadows) = passes::derive::derive(checked.body, answers.on(Subject::Derivatives));
+            Ok((CheckedShader { host, body, shadows, ..checked }, placed(warnings, &ast.sources)))
+        }
         Err(errors) => Err(placed(errors, &ast.sources)),
     }
 }

@@ -94,9 +94,34 @@ pub fn scalar(op: Op, a: u32, b: u32) -> u32 {
         Op::AddF => arithmetic(Op::AddF, x, y).to_bits(),
         Op::SubF => arithmetic(Op::SubF, x, y).to_bits(),
         Op::MulF => arithmetic(Op::MulF, x, y).to_bits(),
+        Op::DivF => arithmetic(Op::DivF, x, y).to_bits(),
         Op::LtF | Op::LeF | Op::GtF | Op::GeF => u32::from(compare(op, x, y)),
         _ => apply(op, 1, [a, 0, 0], [b, 0, 0], [0; 3])[0],
     }
+}
+
+/// [`scalar`] in every lane.
+#[inline(always)]
+pub fn wide<const L: usize>(op: Op, a: &[u32; L], b: &[u32; L]) -> [u32; L] {
+    // What is frequent is decided once, not per lane.
+    macro_rules! wide {
+        ($($known:ident)*) => {
+            match op {
+                $( Op::$known => each(a, b, #[inline(always)] |a, b| scalar(Op::$known, a, b)), )*
+                _ => each(a, b, |a, b| scalar(op, a, b)),
+            }
+        };
+    }
+    wide!(AddF SubF MulF DivF LtF LeF GtF GeF)
+}
+
+#[inline(always)]
+fn each<const L: usize>(a: &[u32; L], b: &[u32; L], f: impl Fn(u32, u32) -> u32) -> [u32; L] {
+    let mut out = [0; L];
+    for l in 0..L {
+        out[l] = f(a[l], b[l]);
+    }
+    out
 }
 
 /// [`apply`] for arithmetic on the components of triples.
@@ -113,6 +138,7 @@ pub fn componentwise(op: Op, a: Cells, b: Cells) -> Cells {
 }
 
 /// Division where anything by zero is zero, as OSL has it.
+#[inline(always)]
 pub fn divide(a: f32, b: f32) -> f32 {
     if b == 0.0 { 0.0 } else { a / b }
 }

@@ -129,6 +129,8 @@ pub struct CheckedShader {
     pub(super) params: Vec<ParamDecl>,
     pub(super) metadata: Vec<(String, Value)>,
     pub(crate) body: Body,
+    /// How many variables the body had before derivatives were taken, if any were.
+    pub(super) shadows: Option<u32>,
     pub(super) sources: Vec<Arc<Source>>,
     pub(crate) host: Option<Arc<dyn Host>>,
     pub(super) iterations: u32,
@@ -166,7 +168,13 @@ impl CheckedShader {
                 continue;
             };
             match value.to_cells(param.ty, &mut body.strings) {
-                Some(cells) => known[param.var.index()] = Some(cells),
+                Some(cells) => {
+                    known[param.var.index()] = Some(cells);
+                    // Whatever its default does, this does not change from pixel to pixel.
+                    for shadow in self.shadows.into_iter().flat_map(|n| [n, 2 * n]) {
+                        known[param.var.index() + shadow as usize] = Some([0; 3]);
+                    }
+                }
                 None => {
                     let message = format!("`{name}` is {}, not {}", param.ty.name(), value.ty().name());
                     errors.push(Diagnostic::error("E0402", param.span, message).note("declared here"));

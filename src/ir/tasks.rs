@@ -6,6 +6,8 @@ use super::body::Cells;
 use super::functions::matrix::{self, Kind, Matrix};
 use super::functions::text;
 use super::host::{Answers, Host, Lookup, Speech, Subject};
+use super::ops::divide;
+use super::shader::Value;
 use super::types::Ty;
 use crate::globals::Globals;
 
@@ -50,18 +52,24 @@ pub enum Task {
     Split,
     /// A pattern and values.
     Say(Speech),
-    /// A basis, a place, and knots, as many as cells of the result each: the value there.
-    Spline,
     /// A value: whether it is known before shading.
     IsConstant,
-    /// Object, name, what the result holds: whether it is known, and the value.
+    /// A basis, a place, and knots, as many as cells of the result each: the value there.
+    Spline,
+    /// The same with a value of the spline: the place where it is taken.
+    SplineInverse,
+    /// Incident direction, normal and ratio of indices: reflectance, transmittance, and both directions.
+    Fresnel,
+    /// Object, name, index – −1 for none –, what the results hold: whether it is known, and the values.
     Attribute,
+    /// File, what is asked, what the results hold: whether it is known, and the values.
+    TextureInfo,
     /// A name: an int.
     RayType,
     /// A name: an int.
     IsConnected,
     /// Name, s, t, two wraps, first channel, interpolation, color space, missing color and alpha, whether they are
-    /// given: color and alpha.
+    /// given: color and alpha. What s and t change by to the right and down may follow.
     Texture,
 }
 
@@ -112,12 +120,15 @@ pub struct Surroundings<'a, 's> {
 const MAX_STRING: usize = 1 << 16;
 
 impl Task {
+    /// The arguments of a texture lookup up to the derivatives.
+    pub const TEXTURE_ARGS: usize = 11;
+
     /// What it asks the host about, if anything.
     fn subject(self) -> Option<Subject> {
         match self {
             Task::Between(_) | Task::Spaces => Some(Subject::Spaces),
             Task::Attribute | Task::RayType | Task::IsConnected => Some(Subject::Attributes),
-            Task::Texture => Some(Subject::Textures),
+            Task::Texture | Task::TextureInfo => Some(Subject::Textures),
             Task::Say(_) => Some(Subject::Speech),
             _ => None,
         }
@@ -155,6 +166,8 @@ impl Task {
                 put(&mut out[1..], m.unwrap_or(matrix::IDENTITY));
             }
             Task::Spline => spline(args, around, out),
+            Task::SplineInverse => spline_inverse(args, around, out),
+            Task::Fresnel => fresnel(triple(0), triple(1), float(2, 0), out),
             Task::IsConstant => put_int(out, 0),
             Task::RayType | Task::IsConnected => {
                 let Surroundings { strings, host, globals } = around;
@@ -166,6 +179,12 @@ impl Task {
                 put_int(out, i32::from(answer));
             }
             Task::Attribute => attribute(args, around, out),
+            Task::TextureInfo => {
+                let name = |i: usize| around.strings.get(args.get(i).map_or(0, |(_, cells)| cells[0]));
+                let (file, what) = (name(0), name(1));
+                let answers = answers(&out[1..], |ty, k| around.host?.texture_info(file, what, k, ty));
+                found(&args[2..], answers, around, out);
+            }
             Task::Texture => texture(args, around, out),
             _ => self.on_strings(args, around, out),
         }
@@ -260,20 +279,88 @@ fn between(from: i32, to: i32, around: &Surroundings) -> Option<Matrix> {
 }
 
 fn attribute(args: &[(Ty, Cells)], around: &mut Surroundings, out: &mut [(Ty, Cells)]) {
-    let [(_, found), (ty, value), ..] = out else { return };
-    let name = |i: usize| around.strings.get(args.get(i).map_or(0, |(_, cells)| cells[0]));
-    // What the variable holds stays if nothing is found.
-    *value = args.get(2).map_or([0; 3], |(_, cells)| *cells);
-    *found = [0; 3];
-    let answer = around.host.and_then(|host| host.attribute(name(0), name(1), *ty, around.globals));
-    let mut made = Vec::new();
-    let cells = answer.and_then(|answer| match answer {
-        super::shader::Value::String(text) if *ty == Ty::String => Some([around.strings.number(text), 0, 0]),
-        other => other.to_cells(*ty, &mut made),
-    });
-    if let Some(cells) = cells {
-        (*found, *value) = ([1, 0, 0], cells);
+    let cell = |i: usize| args.get(i).map_or(0, |(_, cells)| cells[0]);
+    let (object, name) = (around.strings.get(cell(0)), around.strings.get(cell(1)));
+    let globals = around.globals;
+    let answers = match usize::try_from(cell(2) as i32) {
+        Err(_) => answers(&out[1..], |ty, _| around.host?.attribute(object, name, ty, globals)),
+        Ok(first) => answers(&out[1..], |ty, k| around.host?.attribute_element(object, name, first + k, ty, globals)),
+    };
+    found(&args[3..], answers, around, out);
+}
+
+/// What is answered for each result; `None` if anything is missing.
+fn answers(wanted: &[(Ty, Cells)], ask: impl Fn(Ty, usize) -> Option<Value>) -> Option<Vec<Value>> {
+    wanted.iter().enumerate().map(|(k, (ty, _))| ask(*ty, k)).collect()
+}
+
+/// Whether there are answers, and these; what the variables hold stays if not.
+fn found(old: &[(Ty, Cells)], answers: Option<Vec<Value>>, around: &mut Surroundings, out: &mut [(Ty, Cells)]) {
+    let types: Vec<Ty> = out[1..].iter().map(|(ty, _)| *ty).collect();
+    let mut cells = |answer: Value, ty: Ty| match answer {
+        Value::String(text) if ty == Ty::String => Some([around.strings.number(text), 0, 0]),
+        other => other.to_cells(ty, &mut Vec::new()),
+    };
+    let values: Option<Vec<Cells>> =
+        answers.and_then(|answers| answers.into_iter().zip(types).map(|(answer, ty)| cells(answer, ty)).collect());
+    put_int(out, i32::from(values.is_some()));
+    let values = values.unwrap_or_else(|| old.iter().map(|(_, cells)| *cells).collect());
+    out[1..].iter_mut().zip(values).for_each(|((_, cells), value)| *cells = value);
+}
+
+/// As stdosl.h has it: unpolarised, T in flux.
+fn fresnel(i: [f32; 3], n: [f32; 3], eta: f32, out: &mut [(Ty, Cells)]) {
+    let along: f32 = (0..3).map(|k| i[k] * n[k]).sum();
+    let c = along.abs();
+    let inverse = divide(1.0, eta * eta);
+    let square = inverse - 1.0 + c * c;
+    let reflected = [0, 1, 2].map(|k| i[k] - 2.0 * along * n[k]);
+    let (mut kr, mut kt, mut refracted) = (1.0, 0.0, [0.0; 3]);
+    if square >= 0.0 {
+        let g = square.sqrt();
+        let beta = g - c;
+        let parallel = divide(c * (g + c) - 1.0, c * beta + 1.0);
+        let ratio = divide(beta, g + c);
+        kr = 0.5 * (1.0 + parallel * parallel) * ratio * ratio;
+        kt = (1.0 - kr) * eta * eta;
+        let rest = 1.0 - eta * eta * (1.0 - along * along);
+        if rest >= 0.0 {
+            let by = eta * along + rest.sqrt();
+            refracted = [0, 1, 2].map(|k| eta * i[k] - by * n[k]);
+        }
     }
+    put(out, [kr, kt]);
+    put_triple(&mut out[2..], reflected);
+    put_triple(&mut out[3..], refracted);
+}
+
+/// Where a spline that rises or falls throughout takes a value: 0 or 1 beyond its ends.
+fn spline_inverse(args: &[(Ty, Cells)], around: &Surroundings, out: &mut [(Ty, Cells)]) {
+    let Some((_, wanted)) = args.get(1) else { return };
+    let wanted = f32::from_bits(wanted[0]);
+    let at = |x: f32| {
+        let mut args = args.to_vec();
+        args[1].1 = [x.to_bits(), 0, 0];
+        let mut value = [(Ty::Float, [0; 3])];
+        spline(&args, around, &mut value);
+        f32::from_bits(value[0].1[0])
+    };
+    let rises = at(1.0) >= at(0.0);
+    let short = |x: f32| if rises { at(x) < wanted } else { at(x) > wanted };
+    let (mut lo, mut hi) = (0.0, 1.0);
+    let place = if !short(lo) {
+        lo
+    } else if short(hi) {
+        hi
+    } else {
+        // As many halvings as there are digits.
+        for _ in 0..24 {
+            let middle = 0.5 * (lo + hi);
+            if short(middle) { lo = middle } else { hi = middle }
+        }
+        0.5 * (lo + hi)
+    };
+    put(out, [place]);
 }
 
 fn texture(args: &[(Ty, Cells)], around: &Surroundings, out: &mut [(Ty, Cells)]) {
@@ -293,6 +380,10 @@ fn texture(args: &[(Ty, Cells)], around: &Surroundings, out: &mut [(Ty, Cells)])
         missing: given.then_some(missing),
         interpolation: word(6),
         colorspace: word(7),
+        changes: [
+            [float(Task::TEXTURE_ARGS), float(Task::TEXTURE_ARGS + 1)],
+            [float(Task::TEXTURE_ARGS + 2), float(Task::TEXTURE_ARGS + 3)],
+        ],
     };
     let found = around.host.and_then(|host| host.texture(&lookup, around.globals));
     let [r, g, b, a] = found.unwrap_or(missing).map(|x| if x.is_finite() { x } else { 0.0 });

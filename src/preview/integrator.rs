@@ -239,8 +239,8 @@ fn face(point: &Point, wo: Vec3) -> (Globals, Exits) {
         v: point.v,
         dpdu: point.dpdu,
         dpdv: point.dpdv,
-        time: 0.0,
         backfacing,
+        ..Globals::default()
     };
     (globals, Exits { n, near, far })
 }

@@ -41,7 +41,11 @@ impl Checker<'_> {
 
     fn spill_with(&mut self, target: &Target) -> Target {
         let keep = |checker: &mut Self, at: At| match at {
-            At::Expr(index) => At::Var(checker.kept(index, Ty::Int)),
+            At::Expr(index) => {
+                let var = checker.temporary(Ty::Int);
+                checker.keep(var, index);
+                At::Var(var)
+            }
             other => other,
         };
         let place = Place { at: keep(self, target.place.at), ..target.place };
@@ -202,7 +206,8 @@ impl Checker<'_> {
         }
         if self.pending.len() > 1 || self.pending.first().is_some_and(|id| *id != from) {
             // Others wait too; the new value is kept with them.
-            let var = self.kept(new, to.ty);
+            let var = self.temporary(to.ty);
+            self.keep(var, new);
             self.spill();
             new = self.push(ExprKind::Var(var), to.ty, span).id;
         }
@@ -231,7 +236,7 @@ impl Checker<'_> {
         if ty == Ty::Matrix && value.ty.is_scalar() {
             let float = self.convert(value, Ty::Float, span);
             let var = self.temporary(Ty::Float);
-            self.assign(var, float);
+            self.keep(var, float);
             self.spill();
             return self.diagonal(place, var, span);
         }

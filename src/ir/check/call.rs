@@ -122,7 +122,7 @@ impl<'a> Checker<'a> {
         let builtin = &BUILTINS[index as usize];
         // A noise is as many numbers as its place asks for.
         let ty = wanted.filter(|wanted| builtin.result_follows_use() && wanted.is_triple()).unwrap_or(ty);
-        if let Some(warning) = builtins::warning(name) {
+        if let Some(warning) = builtins::warning(name, self.derivatives) {
             self.diagnostics.push(Diagnostic::warning("W0506", span, warning));
         }
         let mut converted: Vec<ExprId> =

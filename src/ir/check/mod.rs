@@ -4,6 +4,7 @@
 //! out has explicit conversions and closure calls resolved to lobes, and later stages take nothing else. Nothing is
 //! evaluated here but metadata and defaults.
 
+mod ask;
 mod assign;
 mod call;
 mod closure;
@@ -17,6 +18,7 @@ mod suggest;
 mod task;
 
 use super::body::{Body, ExprId, ExprKind, Root, Stmt, VarId};
+use super::host::{Answers, Subject};
 use super::passes::fold;
 use super::shader::{CheckedShader, ParamDecl, Value};
 use super::types::Ty;
@@ -31,14 +33,16 @@ use std::collections::HashMap;
 use std::sync::Arc;
 pub(super) use suggest::suggest;
 
-/// Checks a parsed script. Ok: the shader and its warnings.
+/// Checks a parsed script. `answers`: what the host says anything about. Ok: the shader and its warnings.
 pub fn check(
     name: &str,
     ast: &Ast,
     hosts: &[Form],
     limits: &Limits,
+    answers: Answers,
 ) -> Result<(CheckedShader, Vec<Diagnostic>), Vec<Diagnostic>> {
     let mut checker = Checker::new(ast, hosts, limits);
+    checker.derivatives = answers.on(Subject::Derivatives);
     let shader = checker.shader(name);
     // A function written out twice is wrong twice; that is said once.
     let mut said = Vec::new();
@@ -89,6 +93,8 @@ struct Checker<'a> {
     /// Closures of the host.
     hosts: &'a [Form],
     limits: Limits,
+    /// The host gives derivatives.
+    derivatives: bool,
     body: Body,
     diagnostics: Vec<Diagnostic>,
     /// The meaning of each syntax expression of the run at hand.
@@ -136,6 +142,7 @@ impl<'a> Checker<'a> {
             ast,
             hosts,
             limits: *limits,
+            derivatives: false,
             body,
             diagnostics: Vec::new(),
             typed: Vec::new(),
@@ -200,7 +207,9 @@ impl<'a> Checker<'a> {
         let body = std::mem::take(&mut self.body);
         let sources = ast.sources.iter().map(|s: &Source| Arc::new(s.clone())).collect();
         let (host, iterations) = (None, self.limits.iterations);
-        let mut checked = CheckedShader { name, span: shader.span, params, metadata, body, sources, host, iterations };
+        let span = shader.span;
+        let mut checked =
+            CheckedShader { name, span, params, metadata, body, shadows: None, sources, host, iterations };
         let known = fold::values_after(&checked.body, count);
         for param in checked.params.iter_mut().filter(|p| p.ty != Ty::Closure) {
             param.default =

@@ -20,9 +20,11 @@ const TASKS: &[&str] = &[
     "endswith",
     "error",
     "format",
+    "fresnel",
     "getattribute",
     "getchar",
     "getmatrix",
+    "gettextureinfo",
     "hash",
     "isconnected",
     "isconstant",
@@ -30,6 +32,7 @@ const TASKS: &[&str] = &[
     "raytype",
     "sincos",
     "spline",
+    "splineinverse",
     "split",
     "startswith",
     "stof",
@@ -69,6 +72,13 @@ impl Checker<'_> {
             ("stof", [Text]) => simple(Task::ToFloat, &[Text], Float),
             ("getchar", [Text, Int]) => simple(Task::Char, &[Text, Int], Int),
             ("hash", [Text]) => simple(Task::Hash, &[Text], Int),
+            ("substr", [Text, Int]) => {
+                // To the end: no string is longer.
+                self.aside(given);
+                let (text, start) = (self.value_of(given, 0, Text), self.value_of(given, 1, Int));
+                let all = self.number(i32::MAX as f32, Int, span);
+                return Some(self.result(Task::Part, vec![text, start, all], Text, span));
+            }
             ("substr", [Text, Int, Int]) => simple(Task::Part, &[Text, Int, Int], Text),
             ("raytype", [Text]) => simple(Task::RayType, &[Text], Int),
             ("determinant", [Matrix]) => simple(Task::Determinant, &[Matrix], Float),
@@ -154,7 +164,13 @@ impl Checker<'_> {
                 Some(self.split(given, types, span))
             }
             ("getattribute", [Text, ..]) => self.attribute(given, types, span),
-            ("spline", [Text, _, ..]) => self.spline(given, types, span),
+            ("spline" | "splineinverse", [Text, _, ..]) => self.spline(name, given, types, span),
+            ("fresnel", [i, n, eta, rest @ ..])
+                if i.is_spatial() && n.is_spatial() && eta.is_scalar() && matches!(rest.len(), 2 | 4) =>
+            {
+                Some(self.fresnel(given, types, span))
+            }
+            ("gettextureinfo", [Text, Text, _]) => self.texture_info(given, types, span),
             ("texture", [Text, _, _, ..]) => Some(self.texture(given, types, span, wanted)),
             ("exit", []) if self.stack.is_empty() => {
                 let d = Diagnostic::error("E0109", span, "`exit()` is not supported: use `return`");
@@ -184,7 +200,7 @@ impl Checker<'_> {
     }
 
     /// The variables that hold an argument, part by part.
-    fn variables(&mut self, given: &Given, index: usize, ty: Ty, span: Span, out: &mut Vec<VarId>) {
+    pub(super) fn variables(&mut self, given: &Given, index: usize, ty: Ty, span: Span, out: &mut Vec<VarId>) {
         let typed = self.of(given.ids[index]);
         match typed.place {
             Some(place) if typed.ty.is_aggregate() => {
@@ -203,7 +219,7 @@ impl Checker<'_> {
     }
 
     /// An argument as a `ty`, in a variable.
-    fn value_of(&mut self, given: &Given, index: usize, ty: Ty) -> VarId {
+    pub(super) fn value_of(&mut self, given: &Given, index: usize, ty: Ty) -> VarId {
         let id = given.ids[index];
         let typed = self.of(id);
         if let Some(var) = typed.temp.filter(|var| self.body.vars[var.index()] == ty) {
@@ -215,21 +231,21 @@ impl Checker<'_> {
         self.kept(value, ty)
     }
 
-    fn text(&mut self, text: &str, span: Span) -> VarId {
+    pub(super) fn text(&mut self, text: &str, span: Span) -> VarId {
         self.run_start = self.body.exprs.len() as u32;
         let number = self.string(text);
         let id = self.push(ExprKind::Const([number, 0, 0]), Ty::String, span).id;
         self.kept(id, Ty::String)
     }
 
-    fn number(&mut self, value: f32, ty: Ty, span: Span) -> VarId {
+    pub(super) fn number(&mut self, value: f32, ty: Ty, span: Span) -> VarId {
         self.run_start = self.body.exprs.len() as u32;
         let bits = if ty == Ty::Int { value as i32 as u32 } else { value.to_bits() };
         let id = self.push(ExprKind::Const([bits; 3]), ty, span).id;
         self.kept(id, ty)
     }
 
-    fn deed(&mut self, task: Task, args: Vec<VarId>, outs: Vec<VarId>, span: Span) {
+    pub(super) fn deed(&mut self, task: Task, args: Vec<VarId>, outs: Vec<VarId>, span: Span) {
         self.block.push(Stmt::Do(Box::new(Deed { task, args, outs, span })));
         self.run_start = self.body.exprs.len() as u32;
     }
@@ -248,13 +264,13 @@ impl Checker<'_> {
         self.load(place, ty, span)
     }
 
-    fn back(&mut self, var: VarId, ty: Ty, span: Span) -> Typed {
+    pub(super) fn back(&mut self, var: VarId, ty: Ty, span: Span) -> Typed {
         self.resume();
         self.push(ExprKind::Var(var), ty, span)
     }
 
     /// Writes what was found to the variable that a call names for it.
-    fn write_result(&mut self, to: ast::ExprId, from: Place, ty: Ty, span: Span) {
+    pub(super) fn write_result(&mut self, to: ast::ExprId, from: Place, ty: Ty, span: Span) {
         let Some(target) = self.target(to) else { return };
         self.run_start = self.body.exprs.len() as u32;
         match target.ty.is_aggregate() {
@@ -278,137 +294,6 @@ impl Checker<'_> {
         self.deed(Task::Split, vec![source, separator, most], outs, span);
         self.write_result(given.ids[1], pieces, types[1], span);
         self.back(count, Ty::Int, span)
-    }
-
-    /// `getattribute("name", variable)` and `getattribute("object", "name", variable)`.
-    fn attribute(&mut self, given: &Given, types: &[Ty], span: Span) -> Option<Typed> {
-        let (object, name, target) = match types {
-            [Ty::String, _] => (None, 0, 1),
-            [Ty::String, Ty::String, _] => (Some(0), 1, 2),
-            _ => {
-                let d = Diagnostic::error("E0109", span, "`getattribute()` with an index is not supported");
-                return Some(self.error(d));
-            }
-        };
-        let ty = types[target];
-        if ty.is_aggregate() || matches!(ty, Ty::Closure | Ty::Void) {
-            let message = format!("`getattribute()` into {} is not supported", self.words(ty));
-            return Some(self.error(Diagnostic::error("E0109", span, message)));
-        }
-        self.aside(given);
-        let object = match object {
-            Some(index) => self.value_of(given, index, Ty::String),
-            None => self.text("", span),
-        };
-        let name = self.value_of(given, name, Ty::String);
-        let old = self.value_of(given, target, ty);
-        let (found, value) = (self.temporary(Ty::Int), self.temporary(ty));
-        self.deed(Task::Attribute, vec![object, name, old], vec![found, value], span);
-        self.write_result(given.ids[target], at(value), ty, span);
-        Some(self.back(found, Ty::Int, span))
-    }
-
-    /// `spline("basis", x, a, b, c, d, …)` and `spline("basis", x, array)`.
-    fn spline(&mut self, given: &Given, types: &[Ty], span: Span) -> Option<Typed> {
-        if !types[1].is_scalar() {
-            return None;
-        }
-        let result = match types[2..] {
-            [Ty::Array(number)] => self.arrays[usize::from(number)].0,
-            // `spline("basis", x, count, array)`
-            [Ty::Int, Ty::Array(number)] => self.arrays[usize::from(number)].0,
-            [..] if types.len() >= 6 && types[2..].iter().all(|ty| ty.is_scalar()) => Ty::Float,
-            [first, _, .., last] if types.len() >= 6 && first == last => first,
-            _ => return None,
-        };
-        if !(result == Ty::Float || result.is_triple()) {
-            return None;
-        }
-        self.aside(given);
-        let mut args = vec![self.value_of(given, 0, Ty::String), self.value_of(given, 1, Ty::Float)];
-        let first = if matches!(types[2..], [Ty::Int, Ty::Array(_)]) { 3 } else { 2 };
-        for i in first..types.len() {
-            self.variables(given, i, result, span, &mut args);
-        }
-        Some(self.result(Task::Spline, args, result, span))
-    }
-
-    /// `texture("file", s, t, …)`; derivatives are not used.
-    fn texture(&mut self, given: &Given, types: &[Ty], span: Span, wanted: Option<Ty>) -> Typed {
-        if !types[1].is_scalar() || !types[2].is_scalar() {
-            let message = "the coordinates of `texture` are floats";
-            return self.error(Diagnostic::error("E0205", span, message));
-        }
-        self.aside(given);
-        let name = self.value_of(given, 0, Ty::String);
-        let (s, t) = (self.value_of(given, 1, Ty::Float), self.value_of(given, 2, Ty::Float));
-        let periodic = self.text("default", span);
-        let channel = self.number(0.0, Ty::Int, span);
-        let smart = self.text("smartcubic", span);
-        let plain = self.text("", span);
-        let (black, clear) = (self.number(0.0, Ty::Color, span), self.number(0.0, Ty::Float, span));
-        let no = self.number(0.0, Ty::Int, span);
-        let mut args = vec![name, s, t, periodic, periodic, channel, smart, plain, black, clear, no];
-        let mut alpha = None;
-        // Four derivatives may stand before the options.
-        let mut next = if types.get(3).is_some_and(|ty| ty.is_scalar()) { 7 } else { 3 };
-        while next < given.ids.len() {
-            let key = self.ast.expr(given.ids[next]).kind;
-            let (ast::ExprKind::String(key), Some(ty)) = (key, types.get(next + 1).copied()) else {
-                let d = Diagnostic::error("E0302", self.span_of(given.ids[next]), "expected an option and its value");
-                self.error(d);
-                break;
-            };
-            let slot = |slots: &[usize], ty| Some((slots.to_vec(), ty));
-            let found = match self.ast.name(key) {
-                "wrap" => slot(&[3, 4], Ty::String),
-                "swrap" => slot(&[3], Ty::String),
-                "twrap" => slot(&[4], Ty::String),
-                "firstchannel" => slot(&[5], Ty::Int),
-                "interp" => slot(&[6], Ty::String),
-                "colorspace" => slot(&[7], Ty::String),
-                "missingcolor" => slot(&[8], Ty::Color),
-                "missingalpha" => slot(&[9], Ty::Float),
-                "alpha" => {
-                    alpha = Some(given.ids[next + 1]);
-                    None
-                }
-                "blur" | "sblur" | "tblur" | "width" | "swidth" | "twidth" | "fill" | "subimage" | "time" | "rwrap"
-                | "errormessage" => None,
-                other => {
-                    let message = format!("`texture` has no option `{other}`");
-                    self.error(Diagnostic::error("E0302", self.span_of(given.ids[next]), message));
-                    None
-                }
-            };
-            if let Some((slots, wants)) = found {
-                if ty.distance(wants).is_none() {
-                    let message = format!("this option is {}, not {}", wants.name(), self.words(ty));
-                    self.error(Diagnostic::error("E0203", self.span_of(given.ids[next + 1]), message));
-                    break;
-                }
-                let var = self.value_of(given, next + 1, wants);
-                slots.iter().for_each(|slot| args[*slot] = var);
-                if slots == [8] {
-                    args[10] = self.number(1.0, Ty::Int, span);
-                }
-            }
-            next += 2;
-        }
-        let (color, opacity) = (self.temporary(Ty::Color), self.temporary(Ty::Float));
-        self.deed(Task::Texture, args, vec![color, opacity], span);
-        if let Some(target) = alpha {
-            self.write_result(target, at(opacity), Ty::Float, span);
-        }
-        let value = self.back(color, Ty::Color, span);
-        match wanted {
-            Some(Ty::Float) => {
-                let first = self.int(0, span);
-                self.op(Op::Component, &[value.id, first.id], Ty::Float, span)
-            }
-            Some(ty) if ty.is_triple() => Typed { ty, ..value },
-            _ => value,
-        }
     }
 
     /// Operators of matrices.
@@ -568,7 +453,7 @@ impl Checker<'_> {
     }
 }
 
-fn at(var: VarId) -> Place {
+pub(super) fn at(var: VarId) -> Place {
     Place { base: var, len: 1, at: At::Known(0) }
 }
 

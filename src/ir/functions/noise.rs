@@ -13,60 +13,90 @@
 /// Names by their number.
 pub const KINDS: &[&str] = &["uperlin", "noise", "perlin", "snoise", "cell", "hash", "simplex", "usimplex"];
 
-/// A coordinate.
+/// Coordinates of `L` points.
 #[derive(Clone, Copy, Debug)]
-pub struct At {
+pub struct At<const L: usize> {
     /// Unused dimensions at the end.
-    pub x: [f32; 4],
+    pub x: [[f32; L]; 4],
     /// How many dimensions count.
     pub n: usize,
     /// Whole numbers after which the noise repeats; 0 means never.
-    pub period: [f32; 4],
+    pub period: [[f32; L]; 4],
 }
 
-/// Noise of the kind numbered `kind` in [`KINDS`]; `channel` tells the components of a triple apart.
-pub fn noise(kind: usize, at: &At, channel: u32) -> f32 {
-    if at.x[..at.n].iter().any(|x| !x.is_finite()) {
-        return 0.0;
+/// Noise of the kind numbered `kind` in [`KINDS`], at each point what it is at that point alone; `channel` tells the
+/// components of a triple apart.
+pub fn noise<const L: usize>(kind: usize, at: &At<L>, channel: u32) -> [f32; L] {
+    if at.x[..at.n].iter().flatten().any(|x| !x.is_finite()) {
+        // The others are not to notice.
+        return if L == 1 { [0.0; L] } else { at.each(|one| noise(kind, one, channel)) };
     }
-    let half = |x: f32| 0.5 + 0.5 * x;
+    let half = |mut x: [f32; L]| {
+        x.iter_mut().for_each(|x| *x = 0.5 + 0.5 * *x);
+        x
+    };
     match kind {
         2 | 3 => perlin(at, channel),
-        4 => unit(hash(&at.cells(|x| x), at.n, channel)),
-        5 => unit(hash(&at.x.map(|x| (x + 0.0).to_bits()), at.n, channel)),
-        6 => simplex(at, channel),
-        7 => half(simplex(at, channel)),
+        4 => at.each(|one| [unit(hash(&one.cells(), at.n, channel))]),
+        5 => at.each(|one| [unit(hash(&one.x.map(|x| (x[0] + 0.0).to_bits()), at.n, channel))]),
+        6 => at.each(|one| simplex(one, channel)),
+        7 => half(at.each(|one| simplex(one, channel))),
         _ => half(perlin(at, channel)),
     }
 }
 
-impl At {
-    /// The cell of each coordinate, after `step`, within the period.
-    fn cells(&self, step: impl Fn(f32) -> f32) -> [u32; 4] {
-        std::array::from_fn(|d| self.wrapped(step(self.x[d]).floor(), d))
-    }
-
-    fn wrapped(&self, cell: f32, d: usize) -> u32 {
-        let period = self.period[d].floor();
-        let cell = if period >= 1.0 { cell - period * (cell / period).floor() } else { cell };
-        // Through i64, so that far cells wrap round instead of piling up at the end.
-        cell as i64 as u32
+impl<const L: usize> At<L> {
+    /// Point by point.
+    fn each(&self, f: impl Fn(&At<1>) -> [f32; 1]) -> [f32; L] {
+        std::array::from_fn(|l| {
+            let one = |values: &[[f32; L]; 4]| values.map(|x| [x[l]]);
+            f(&At { x: one(&self.x), n: self.n, period: one(&self.period) })[0]
+        })
     }
 
     /// The cells around coordinate `d`, and how far it lies above the lower one.
     #[inline(always)]
-    fn around(&self, d: usize) -> ([u32; 2], f32) {
-        let x = self.x[d];
-        if self.period[d] >= 1.0 || x.abs() >= 2_147_483_648.0 {
-            let floor = x.floor();
-            return ([self.wrapped(floor, d), self.wrapped(floor + 1.0, d)], x - floor);
+    fn around(&self, d: usize) -> ([[u32; L]; 2], [f32; L]) {
+        let (mut cells, mut above) = ([[0; L]; 2], [0.0; L]);
+        let x = &self.x[d];
+        let odd = |l: usize| self.period[d][l] >= 1.0 || x[l].abs() >= 2_147_483_648.0;
+        let any_odd = (0..L).fold(false, |any, l| any | odd(l));
+        for l in 0..L {
+            // `floor` is a call where the processor has no instruction for it; a conversion never is.
+            let whole = x[l] as i32;
+            let below = i32::from(whole as f32 > x[l]);
+            let cell = whole.wrapping_sub(below) as u32;
+            (cells[0][l], cells[1][l]) = (cell, cell.wrapping_add(1));
+            above[l] = x[l] - (whole as f32 - below as f32);
         }
-        // `floor` is a call where the processor has no instruction for it; a conversion never is.
-        let whole = x as i32;
-        let below = i32::from(whole as f32 > x);
-        let cell = whole.wrapping_sub(below) as u32;
-        ([cell, cell.wrapping_add(1)], x - (whole as f32 - below as f32))
+        if any_odd {
+            for l in (0..L).filter(|l| odd(*l)) {
+                let floor = x[l].floor();
+                let period = self.period[d][l];
+                (cells[0][l], cells[1][l]) = (wrapped(floor, period), wrapped(floor + 1.0, period));
+                above[l] = x[l] - floor;
+            }
+        }
+        (cells, above)
     }
+}
+
+impl At<1> {
+    /// The cell of each coordinate within the period.
+    fn cells(&self) -> [u32; 4] {
+        std::array::from_fn(|d| self.wrapped(self.x[d][0].floor(), d))
+    }
+
+    fn wrapped(&self, cell: f32, d: usize) -> u32 {
+        wrapped(cell, self.period[d][0])
+    }
+}
+
+fn wrapped(cell: f32, period: f32) -> u32 {
+    let period = period.floor();
+    let cell = if period >= 1.0 { cell - period * (cell / period).floor() } else { cell };
+    // Through i64, so that far cells wrap round instead of piling up at the end.
+    cell as i64 as u32
 }
 
 /// Mixes up to four words (Jenkins' one-at-a-time, with a final avalanche).
@@ -151,45 +181,57 @@ fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     }
 }
 
-fn perlin(at: &At, channel: u32) -> f32 {
+fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
     // One body per dimension: its loops are of known length then, which is most of the speed.
     match at.n {
-        1 => perlin_in::<1>(at, channel),
-        2 => perlin_in::<2>(at, channel),
-        3 => perlin_in::<3>(at, channel),
-        _ => perlin_in::<4>(at, channel),
+        1 => perlin_in::<1, L>(at, channel),
+        2 => perlin_in::<2, L>(at, channel),
+        3 => perlin_in::<3, L>(at, channel),
+        _ => perlin_in::<4, L>(at, channel),
     }
 }
 
-fn perlin_in<const N: usize>(at: &At, channel: u32) -> f32 {
+fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
     // Along each coordinate: what the two cells add to the hash, the offsets from them, the share of the upper one.
-    let (mut shares, mut offsets, mut fade) = ([[0u32; 2]; N], [[0.0f32; 2]; 4], [0.0f32; N]);
+    let (mut shares, mut offsets, mut fade) = ([[[0u32; L]; 2]; N], [[[0.0f32; L]; 2]; 4], [[0.0f32; L]; N]);
     for d in 0..N {
         let (cells, t) = at.around(d);
-        shares[d] = cells.map(|cell| share_of(cell, d));
-        offsets[d] = [t, t - 1.0];
-        fade[d] = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+        for l in 0..L {
+            let t = t[l];
+            (shares[d][0][l], shares[d][1][l]) = (share_of(cells[0][l], d), share_of(cells[1][l], d));
+            (offsets[d][0][l], offsets[d][1][l]) = (t, t - 1.0);
+            fade[d][l] = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+        }
     }
     // Bit d of a corner's number is its step along coordinate d.
     let seed = seed(N, channel);
-    let (mut hashes, mut values) = ([0u32; 16], [0.0f32; 16]);
+    let (mut hashes, mut values) = ([[0u32; L]; 16], [[0.0f32; L]; 16]);
     for corner in 0..1 << N {
-        hashes[corner] = avalanche((0..N).fold(seed, |h, d| h.wrapping_add(shares[d][corner >> d & 1])));
+        for l in 0..L {
+            hashes[corner][l] = avalanche((0..N).fold(seed, |h, d| h.wrapping_add(shares[d][corner >> d & 1][l])));
+        }
     }
     for corner in 0..1 << N {
-        values[corner] = gradient::<N>(hashes[corner], std::array::from_fn(|d| offsets[d][corner >> d & 1]));
+        for l in 0..L {
+            let offset = std::array::from_fn(|d| offsets[d][corner >> d & 1][l]);
+            values[corner][l] = gradient::<N>(hashes[corner][l], offset);
+        }
     }
     for d in (0..N).rev() {
         for k in 0..1 << d {
-            values[k] += fade[d] * (values[k + (1 << d)] - values[k]);
+            for l in 0..L {
+                values[k][l] += fade[d][l] * (values[k + (1 << d)][l] - values[k][l]);
+            }
         }
     }
     // What brings it to ±1: at the middle of a cell all corners' gradients may agree.
     let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
-    (values[0] / largest).clamp(-1.0, 1.0)
+    let mut out = values[0];
+    out.iter_mut().for_each(|x| *x = (*x / largest).clamp(-1.0, 1.0));
+    out
 }
 
-fn simplex(at: &At, channel: u32) -> f32 {
+fn simplex(at: &At<1>, channel: u32) -> [f32; 1] {
     match at.n {
         1 => simplex_in::<1>(at, channel),
         2 => simplex_in::<2>(at, channel),
@@ -198,15 +240,15 @@ fn simplex(at: &At, channel: u32) -> f32 {
     }
 }
 
-fn simplex_in<const N: usize>(at: &At, channel: u32) -> f32 {
+fn simplex_in<const N: usize>(at: &At<1>, channel: u32) -> [f32; 1] {
     let nf = N as f32;
     // Skew to a grid of cubes whose simplices are regular; back again with `unskew`.
     let skew = ((nf + 1.0).sqrt() - 1.0) / nf;
     let unskew = (1.0 - 1.0 / (nf + 1.0).sqrt()) / nf;
-    let slant: f32 = at.x[..N].iter().sum::<f32>() * skew;
-    let cell: [f32; N] = std::array::from_fn(|d| (at.x[d] + slant).floor());
+    let slant: f32 = at.x[..N].iter().map(|x| x[0]).sum::<f32>() * skew;
+    let cell: [f32; N] = std::array::from_fn(|d| (at.x[d][0] + slant).floor());
     let back: f32 = cell.iter().sum::<f32>() * unskew;
-    let first: [f32; N] = std::array::from_fn(|d| at.x[d] - (cell[d] - back));
+    let first: [f32; N] = std::array::from_fn(|d| at.x[d][0] - (cell[d] - back));
     // The corners of the simplex: from the cell's corner along the coordinates, the largest first.
     let mut order: [usize; N] = std::array::from_fn(|d| d);
     order.sort_by(|a, b| first[*b].total_cmp(&first[*a]));
@@ -226,17 +268,21 @@ fn simplex_in<const N: usize>(at: &At, channel: u32) -> f32 {
         }
     }
     let largest = [0.0231, 0.0143, 0.0137, 0.0159][N - 1];
-    (sum / largest).clamp(-1.0, 1.0)
+    [(sum / largest).clamp(-1.0, 1.0)]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn points(n: usize) -> impl Iterator<Item = At> {
+    fn noise(kind: usize, at: &At<1>, channel: u32) -> f32 {
+        super::noise(kind, at, channel)[0]
+    }
+
+    fn points(n: usize) -> impl Iterator<Item = At<1>> {
         (0..40_000u32).map(move |k| {
-            let x = std::array::from_fn(|d| unit(hash(&[k, d as u32, 5, 0], 3, 1)) * 40.0 - 20.0);
-            At { x, n, period: [0.0; 4] }
+            let x = std::array::from_fn(|d| [unit(hash(&[k, d as u32, 5, 0], 3, 1)) * 40.0 - 20.0]);
+            At { x, n, period: [[0.0]; 4] }
         })
     }
 
@@ -245,7 +291,7 @@ mod tests {
         for n in 1..=4 {
             for (kind, name) in KINDS.iter().enumerate() {
                 // Far apart, so that cells are many.
-                let far = |at: At| At { x: at.x.map(|x| x * 97.0), ..at };
+                let far = |at: At<1>| At { x: at.x.map(|x| [x[0] * 97.0]), ..at };
                 let values: Vec<f32> = points(n).map(|at| noise(kind, &far(at), 0)).collect();
                 let (lo, hi) = values.iter().fold((9f32, -9f32), |(l, h), v| (l.min(*v), h.max(*v)));
                 let mean = values.iter().sum::<f32>() / values.len() as f32;
@@ -267,13 +313,13 @@ mod tests {
         for n in 1..=4 {
             for kind in [2, 6] {
                 for at in points(n).take(4000) {
-                    let step = At { x: at.x.map(|x| x + 1e-3), ..at };
+                    let step = At { x: at.x.map(|x| [x[0] + 1e-3]), ..at };
                     let jump = (noise(kind, &at, 0) - noise(kind, &step, 0)).abs();
                     assert!(jump < 0.04, "{n} {kind}: {jump} at {:?}", at.x);
                 }
             }
             for at in points(n).take(200) {
-                let grid = At { x: at.x.map(f32::round), ..at };
+                let grid = At { x: at.x.map(|x| [x[0].round()]), ..at };
                 assert_eq!(noise(2, &grid, 0), 0.0);
             }
         }
@@ -284,8 +330,9 @@ mod tests {
         for n in 1..=4 {
             let mut apart = 0;
             for at in points(n).take(500) {
-                let at = At { x: at.x.map(|x| (x * 16.0).round() / 16.0), period: [3.0, 4.0, 5.0, 7.0], ..at };
-                let next = At { x: std::array::from_fn(|d| at.x[d] + at.period[d]), ..at };
+                let at =
+                    At { x: at.x.map(|x| [(x[0] * 16.0).round() / 16.0]), period: [[3.0], [4.0], [5.0], [7.0]], ..at };
+                let next = At { x: std::array::from_fn(|d| [at.x[d][0] + at.period[d][0]]), ..at };
                 for kind in [0, 2, 4] {
                     assert!((noise(kind, &at, 0) - noise(kind, &next, 0)).abs() < 1e-5);
                 }
@@ -332,9 +379,31 @@ mod tests {
             for (kind, _) in KINDS.iter().enumerate() {
                 for period in [0.0, 1.0, f32::NAN, f32::INFINITY, -3.0] {
                     for n in 1..=4 {
-                        let value = noise(kind, &At { x: [x; 4], n, period: [period; 4] }, 2);
+                        let value = noise(kind, &At { x: [[x]; 4], n, period: [[period]; 4] }, 2);
                         assert!((-1.0..=1.0).contains(&value), "{kind} {x} {period}: {value}");
                     }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn side_by_side_is_one_by_one() {
+        let odd = [f32::NAN, f32::INFINITY, -1e30, 3e9, -0.0, 0.0, 5.0, -7.25];
+        for n in 1..=4 {
+            let ones: Vec<At<1>> = points(n).take(64).collect();
+            for (k, eight) in ones.chunks(8).enumerate() {
+                let mut at = At::<8> {
+                    x: std::array::from_fn(|d| std::array::from_fn(|l| eight[l].x[d][0])),
+                    n,
+                    period: std::array::from_fn(|d| std::array::from_fn(|l| ((k + d) * l % 3) as f32)),
+                };
+                // From the fourth group on a lane or all of them are odd.
+                (0..8).filter(|l| k > 6 || k == l + 4).for_each(|l| at.x[n - 1][l] = odd[l]);
+                for kind in 0..KINDS.len() {
+                    let found = super::noise(kind, &at, 1).map(f32::to_bits);
+                    let alone = at.each(|one| super::noise(kind, one, 1)).map(f32::to_bits);
+                    assert_eq!(found, alone, "{kind} {n} {:?}", at.x);
                 }
             }
         }

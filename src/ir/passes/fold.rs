@@ -395,6 +395,10 @@ impl<'a> Folder<'a> {
                 None if black(ids[1]) && black(ids[2]) => return Folded::Same(ids[1]),
                 None => {}
             },
+            // Comparisons give 0 or 1 already.
+            Op::TruthI if matches!(self.new.expr(ids[0]).kind, ExprKind::Op(op, _) if op.is_truth()) => {
+                return Folded::Same(ids[0]);
+            }
             Op::And if value(ids[0]).is_some_and(|a| a[0] == 0) => return Folded::Kind(ExprKind::Const([0; 3])),
             Op::Or if value(ids[0]).is_some_and(|a| a[0] != 0) => return Folded::Kind(ExprKind::Const([1, 0, 0])),
             _ => {}

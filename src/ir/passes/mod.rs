@@ -1,6 +1,7 @@
 //! What happens to a body between checking and lowering: one pure function per file.
 
 pub mod dead;
+pub mod derive;
 mod env;
 pub mod fold;
 pub mod layers;
