@@ -376,10 +376,20 @@ fn args() -> Result<Args, Box<dyn Error>> {
     Ok(args)
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn run() -> Result<(), Box<dyn Error>> {
     let args = args()?;
     let scene = Scene::open(&args.scene)?;
     render(&scene, &args)?.save(&args.output)?;
     println!("{} faces, {} of them lamps: {}", scene.faces.len(), scene.lamps.len(), args.output.display());
     Ok(())
+}
+
+fn main() -> std::process::ExitCode {
+    match run() {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("{e}");
+            std::process::ExitCode::FAILURE
+        }
+    }
 }

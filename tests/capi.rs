@@ -86,6 +86,11 @@ fn it_gives_what_rust_gives() {
     for (k, direction) in directions.iter().enumerate() {
         assert_eq!(bsdf.eval(*direction), Eval { f_cos: f[k], pdf: pdf[k] });
     }
+    for k in [1, 3] {
+        let mut few = [[0f32; 3]; 3];
+        ok(unsafe { oc_bsdf_eval(b, directions.as_ptr().cast(), k, few.as_mut_ptr().cast(), pdf.as_mut_ptr()) });
+        assert_eq!(few[..k], f[..k], "few are evaluated one by one, to the same bits");
+    }
     let (u, fp) = (numbers.as_ptr().cast(), f.as_mut_ptr().cast());
     ok(unsafe { oc_bsdf_sample(b, u, n, wi.as_mut_ptr().cast(), fp, pdf.as_mut_ptr(), flags.as_mut_ptr()) });
     let mut full = vec![OcSample::default(); n];
@@ -138,6 +143,7 @@ fn wrong_calls_are_errors() {
             (oc_engine_set_tier(e, 9), OcErrorBadValue),
             (oc_engine_set_layering(e, 9), OcErrorBadValue),
             (oc_engine_set_include_dir(e, null()), OcErrorNull),
+            (oc_engine_set_host(e, null()), OcErrorNull),
             (oc_engine_set_tier(m.cast(), 0), OcErrorBadHandle),
             (oc_globals_default(null_mut()), OcErrorNull),
             (oc_material_compile(e, null(), 3, null(), &mut null_mut()), OcErrorNull),
@@ -339,7 +345,8 @@ unsafe extern "C" fn picture(_: *mut c_void, lookup: *const OcLookup, rgba: *mut
         if name != b"a.png" {
             return 0;
         }
-        rgba.cast::<[f32; 4]>().write([lookup.s, lookup.t, lookup.globals.time, 1.0]);
+        // By how much the first coordinate moves per pixel: known where the host gave it.
+        rgba.cast::<[f32; 4]>().write([lookup.s, lookup.t, lookup.globals.time + lookup.changes[0][0], 1.0]);
         1
     }
 }
@@ -353,12 +360,13 @@ fn textures_and_included_files_come_from_the_host() {
     let e = engine();
     unsafe {
         ok(oc_engine_set_include_dir(e, path.as_ptr()));
-        ok(oc_engine_set_texture(e, Some(picture), null_mut()));
+        ok(oc_engine_set_host(e, &OcHost { texture: Some(picture), derivatives: 1, user: null_mut() }));
     }
     let m = material(e, "#include \"half.h\"\nCi = HALF * (color) texture(\"a.png\", u, v) * diffuse(N);");
     let missing =
         material(e, "Ci = (color) texture(\"b.png\", u, v, \"missingcolor\", color(0.1, 0.2, 0.3)) * diffuse(N);");
-    let at = OcGlobals { u: 0.25, v: 0.75, time: 0.5, ..globals() };
+    let mut at = OcGlobals { u: 0.25, v: 0.75, time: 0.25, ..globals() };
+    at.differentials.dudx = 0.25;
     let (mut bsdf, mut albedo) = (null_mut(), [0f32; 3]);
     for (m, wanted) in [(m, [0.125, 0.375, 0.25]), (missing, [0.1, 0.2, 0.3]), (m, [0.125, 0.375, 0.25])] {
         ok(unsafe { oc_shade(m, &at, WO.as_ptr(), &mut bsdf) });

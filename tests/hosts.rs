@@ -168,8 +168,11 @@ fn setting_leaves_clones_alone_and_shares_tables() {
     second.set("c", [0.3, 0.2, 0.1]).expect("sets");
     assert_eq!(first.params(), []);
     assert_eq!(second.params(), [("c".to_owned(), Value::Color([0.3, 0.2, 0.1]))]);
-    let slow = Engine::new().material("s", script).expect("compiles").bake_time();
-    assert!(second.bake_time() < slow / 2 + std::time::Duration::from_micros(50), "{:?}", second.bake_time());
+    // The quickest of several: a machine may be busy elsewhere.
+    let quickest = |times: &mut dyn Iterator<Item = std::time::Duration>| times.min().expect("some");
+    let alone = quickest(&mut (0..5).map(|_| Engine::new().material("s", script).expect("compiles").bake_time()));
+    let shared = quickest(&mut (0..5).map(|_| engine.material("s", script).expect("compiles").bake_time()));
+    assert!(shared < alone / 2, "{shared:?} for {alone:?}");
     let error = second.set("r", "rough").expect_err("a word");
     assert_eq!(error.diagnostics[0].code, "E0402");
     assert!(second.set_all([("rr", 0.5.into()), ("c", 0.1.into())]).is_err());

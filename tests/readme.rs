@@ -31,6 +31,40 @@ fn its_commands_run() {
     assert!(pictures >= 2, "{pictures} pictures");
 }
 
+/// Each host is built and run by one command: this runs those that need only cargo, `tests/capi.rs` the one for C, `.ci/run`
+/// the one for Python.
+#[test]
+fn its_hosts_run() {
+    let (root, folder) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().expect("a folder"));
+    let mut hosts = 0;
+    for line in readme().lines() {
+        let Some(arguments) = line.strip_prefix("    cargo run --release --example ") else { continue };
+        let (name, arguments) = arguments.split_once(" -- ").expect("arguments");
+        let mut command = Command::new(env!("CARGO"));
+        command.args(["run", "--quiet", "--manifest-path"]).arg(root.join("Cargo.toml")).args([
+            "--example",
+            name,
+            "--",
+        ]);
+        command.args(arguments.split_whitespace()).args(["--spp", "2", "--size", "32"]).current_dir(folder.path());
+        let output = command.output().expect("cargo starts");
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        let file = arguments.split_whitespace().skip_while(|a| *a != "-o").nth(1).expect("an output");
+        let picture = image::open(folder.path().join(file)).expect("a picture").to_rgb8();
+        let light = picture.pixels().filter(|p| p.0.iter().any(|c| *c > 40)).count();
+        assert!(light > 400, "{light} of {} pixels are not dark", 32 * 32);
+        hosts += 1;
+    }
+    assert!(hosts >= 1);
+    let ci = std::fs::read_to_string(root.join(".ci/run")).expect(".ci/run");
+    let python =
+        readme().lines().find_map(|l| l.strip_prefix("    pip install ").map(str::to_owned)).expect("a command");
+    let script =
+        python.split("python ").nth(1).expect("a script").split_whitespace().next().expect("a path").to_owned();
+    assert!(root.join(&script).exists() && ci.contains(&script), "{script}");
+    assert!(readme().contains("    sh examples/c/run.sh\n") && root.join("examples/c/run.sh").exists());
+}
+
 #[test]
 fn the_commands_of_the_audit_page_run() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -92,11 +92,27 @@ pub unsafe extern "C" fn oc_bsdf_eval_strided(
     pdf_stride: usize,
 ) -> OcStatus {
     const CHUNK: usize = 64;
+    /// Fewer than this are cheaper one by one than as eight lanes.
+    const FEW: usize = 4;
     guard(|| {
         let found = handle::get(bsdf)?;
         let wi = Strided::new(wi.cast_mut().cast::<[f32; 3]>(), wi_stride, n, "wi")?;
         let f_cos = Strided::new(f_cos.cast::<[f32; 3]>(), f_cos_stride, n, "f_cos")?;
         let pdf = Strided::new(pdf, pdf_stride, n, "pdf")?;
+        // SAFETY: called with indices below `n`.
+        let put = |k: usize, eval: &Eval| unsafe {
+            f_cos.set(k, eval.f_cos);
+            pdf.set(k, eval.pdf);
+        };
+        if n < FEW {
+            found.bsdf()?.with(|bsdf| {
+                for k in 0..n {
+                    // SAFETY: below `n`.
+                    put(k, &bsdf.eval(unsafe { wi.get(k) }));
+                }
+            });
+            return Ok(());
+        }
         let mut directions = [[0.0; 3]; CHUNK];
         let mut results = [Eval { f_cos: [0.0; 3], pdf: 0.0 }; CHUNK];
         found.bsdf()?.with(|bsdf| {
@@ -107,13 +123,7 @@ pub unsafe extern "C" fn oc_bsdf_eval_strided(
                     *direction = unsafe { wi.get(start + k) };
                 }
                 bsdf.eval_batch(&directions[..count], &mut results[..count]);
-                for (k, eval) in results[..count].iter().enumerate() {
-                    // SAFETY: below `n`.
-                    unsafe {
-                        f_cos.set(start + k, eval.f_cos);
-                        pdf.set(start + k, eval.pdf);
-                    }
-                }
+                results[..count].iter().enumerate().for_each(|(k, eval)| put(start + k, eval));
             }
         });
         Ok(())

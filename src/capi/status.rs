@@ -74,7 +74,8 @@ pub(super) fn guard(call: impl FnOnce() -> Result<(), Failure>) -> OcStatus {
             Failure::new(OcStatus::OcErrorInternal, format!("fault in the library: {text}"))
         }
     };
-    LAST.with(|last| *last.borrow_mut() = failure.message);
+    // A thread that is ending may have no place for it any more.
+    let _ = LAST.try_with(|last| *last.borrow_mut() = failure.message);
     failure.status
 }
 
@@ -86,7 +87,7 @@ pub(super) fn guard(call: impl FnOnce() -> Result<(), Failure>) -> OcStatus {
 /// `buffer` is null or has room for `len` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn oc_last_error(buffer: *mut c_char, len: usize) -> usize {
-    LAST.with(|last| {
+    let told = LAST.try_with(|last| {
         let message = last.borrow();
         if !buffer.is_null() && len > 0 {
             let mut end = message.len().min(len - 1);
@@ -97,5 +98,6 @@ pub unsafe extern "C" fn oc_last_error(buffer: *mut c_char, len: usize) -> usize
             unsafe { memory::write_text(buffer, &message[..end]) };
         }
         message.len()
-    })
+    });
+    told.unwrap_or(0)
 }
