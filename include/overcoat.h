@@ -194,6 +194,27 @@ typedef struct oc_closure {
     void *user;
 } oc_closure;
 
+// What changes by one pixel to the right (`x`) and one pixel down (`y`): of the position, of the direction the ray travels,
+// of the surface parameters. Read only where the engine's `oc_host` says so.
+typedef struct oc_differentials {
+    // Of the position.
+    float dpdx[3];
+    // Of the position, downward.
+    float dpdy[3];
+    // Of the direction the ray travels.
+    float didx[3];
+    // Of the direction the ray travels, downward.
+    float didy[3];
+    // Of u.
+    float dudx;
+    // Of u, downward.
+    float dudy;
+    // Of v.
+    float dvdx;
+    // Of v, downward.
+    float dvdy;
+} oc_differentials;
+
 // The shading point, in world space. Fill it with `oc_globals_default` first, then set what is known.
 typedef struct oc_globals {
     // Position.
@@ -214,6 +235,8 @@ typedef struct oc_globals {
     float time;
     // Not 0: the ray hit the back of the surface, and the host turned the normals toward the viewer.
     int32_t backfacing;
+    // How it differs from the points that the neighbouring pixels show.
+    struct oc_differentials differentials;
 } oc_globals;
 
 // One lookup of a texture.
@@ -228,6 +251,9 @@ typedef struct oc_lookup {
     float t;
     // The first channel asked for.
     int32_t first_channel;
+    // How s and t change by one pixel to the right, then by one pixel down: as the script says, or as they follow from
+    // `differentials`; else 0.
+    float changes[2][2];
     // The shading point.
     struct oc_globals globals;
 } oc_lookup;
@@ -235,6 +261,16 @@ typedef struct oc_lookup {
 // Looks up a texture: writes linear RGB and alpha to `rgba` and returns 1, or returns 0 if there is no such picture.
 // Called from whatever thread shades; must neither unwind nor call the library.
 typedef int32_t (*oc_texture_fn)(void *user, const struct oc_lookup *lookup, float *rgba);
+
+// What a host answers, and gives besides.
+typedef struct oc_host {
+    // Looks up textures; null: none are found.
+    oc_texture_fn texture;
+    // Not 0: `differentials` of each `oc_globals` is filled in, and scripts may ask for derivatives.
+    int32_t derivatives;
+    // Handed to every callback.
+    void *user;
+} oc_host;
 
 #ifdef __cplusplus
 extern "C" {
@@ -363,11 +399,13 @@ enum oc_status oc_engine_set_layering(struct oc_engine *engine, uint32_t rule);
 enum oc_status oc_engine_set_include_dir(struct oc_engine *engine,
                                          const char *path);
 
-// Lets the scripts compiled from here on look up textures; null: none are found.
+// Says what the host answers the scripts compiled from here on. Replaces what was said before.
 //
 // # Safety
-// `texture` and `user` may be used from any thread, as long as the process lasts.
-enum oc_status oc_engine_set_texture(struct oc_engine *engine, oc_texture_fn texture, void *user);
+// `host` is null, which is an error, or points to an `oc_host` whose callback and `user` may be used from any thread, as
+// long as the process lasts.
+enum oc_status oc_engine_set_host(struct oc_engine *engine,
+                                  const struct oc_host *host);
 
 // The origin of a plane with its normal along z and u along x.
 //
@@ -566,11 +604,13 @@ enum oc_status oc_engine_set_layering(struct oc_engine *engine, uint32_t rule);
 enum oc_status oc_engine_set_include_dir(struct oc_engine *engine,
                                          const char *path);
 
-// Lets the scripts compiled from here on look up textures; null: none are found.
+// Says what the host answers the scripts compiled from here on. Replaces what was said before.
 //
 // # Safety
-// `texture` and `user` may be used from any thread, as long as the process lasts.
-enum oc_status oc_engine_set_texture(struct oc_engine *engine, oc_texture_fn texture, void *user);
+// `host` is null, which is an error, or points to an `oc_host` whose callback and `user` may be used from any thread, as
+// long as the process lasts.
+enum oc_status oc_engine_set_host(struct oc_engine *engine,
+                                  const struct oc_host *host);
 
 // The origin of a plane with its normal along z and u along x.
 //

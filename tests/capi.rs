@@ -143,6 +143,7 @@ fn wrong_calls_are_errors() {
             (oc_engine_set_tier(e, 9), OcErrorBadValue),
             (oc_engine_set_layering(e, 9), OcErrorBadValue),
             (oc_engine_set_include_dir(e, null()), OcErrorNull),
+            (oc_engine_set_host(e, null()), OcErrorNull),
             (oc_engine_set_tier(m.cast(), 0), OcErrorBadHandle),
             (oc_globals_default(null_mut()), OcErrorNull),
             (oc_material_compile(e, null(), 3, null(), &mut null_mut()), OcErrorNull),
@@ -344,7 +345,8 @@ unsafe extern "C" fn picture(_: *mut c_void, lookup: *const OcLookup, rgba: *mut
         if name != b"a.png" {
             return 0;
         }
-        rgba.cast::<[f32; 4]>().write([lookup.s, lookup.t, lookup.globals.time, 1.0]);
+        // By how much the first coordinate moves per pixel: known where the host gave it.
+        rgba.cast::<[f32; 4]>().write([lookup.s, lookup.t, lookup.globals.time + lookup.changes[0][0], 1.0]);
         1
     }
 }
@@ -358,12 +360,13 @@ fn textures_and_included_files_come_from_the_host() {
     let e = engine();
     unsafe {
         ok(oc_engine_set_include_dir(e, path.as_ptr()));
-        ok(oc_engine_set_texture(e, Some(picture), null_mut()));
+        ok(oc_engine_set_host(e, &OcHost { texture: Some(picture), derivatives: 1, user: null_mut() }));
     }
     let m = material(e, "#include \"half.h\"\nCi = HALF * (color) texture(\"a.png\", u, v) * diffuse(N);");
     let missing =
         material(e, "Ci = (color) texture(\"b.png\", u, v, \"missingcolor\", color(0.1, 0.2, 0.3)) * diffuse(N);");
-    let at = OcGlobals { u: 0.25, v: 0.75, time: 0.5, ..globals() };
+    let mut at = OcGlobals { u: 0.25, v: 0.75, time: 0.25, ..globals() };
+    at.differentials.dudx = 0.25;
     let (mut bsdf, mut albedo) = (null_mut(), [0f32; 3]);
     for (m, wanted) in [(m, [0.125, 0.375, 0.25]), (missing, [0.1, 0.2, 0.3]), (m, [0.125, 0.375, 0.25])] {
         ok(unsafe { oc_shade(m, &at, WO.as_ptr(), &mut bsdf) });

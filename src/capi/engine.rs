@@ -38,6 +38,9 @@ pub struct OcLookup {
     pub t: f32,
     /// The first channel asked for.
     pub first_channel: i32,
+    /// How s and t change by one pixel to the right, then by one pixel down: as the script says, or as they follow from
+    /// `differentials`; else 0.
+    pub changes: [[f32; 2]; 2],
     /// The shading point.
     pub globals: OcGlobals,
 }
@@ -46,20 +49,30 @@ pub struct OcLookup {
 /// Called from whatever thread shades; must neither unwind nor call the library.
 pub type OcTextureFn = Option<unsafe extern "C" fn(user: *mut c_void, lookup: *const OcLookup, rgba: *mut f32) -> i32>;
 
-/// The host's callback as the library asks it.
-struct Textures {
-    call: unsafe extern "C" fn(*mut c_void, *const OcLookup, *mut f32) -> i32,
-    user: *mut c_void,
+/// What a host answers, and gives besides.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct OcHost {
+    /// Looks up textures; null: none are found.
+    pub texture: OcTextureFn,
+    /// Not 0: `differentials` of each `oc_globals` is filled in, and scripts may ask for derivatives.
+    pub derivatives: i32,
+    /// Handed to every callback.
+    pub user: *mut c_void,
 }
 
-// SAFETY: `oc_engine_set_texture` demands that callback and `user` may be used from any thread.
-unsafe impl Send for Textures {}
+// SAFETY: `oc_engine_set_host` demands that callback and `user` may be used from any thread.
+unsafe impl Send for OcHost {}
 // SAFETY: as above.
-unsafe impl Sync for Textures {}
+unsafe impl Sync for OcHost {}
 
-impl Host for Textures {
+impl Host for OcHost {
     fn answers(&self, subject: Subject) -> bool {
-        subject == Subject::Textures
+        match subject {
+            Subject::Textures => self.texture.is_some(),
+            Subject::Derivatives => self.derivatives != 0,
+            Subject::Spaces | Subject::Attributes | Subject::Speech => false,
+        }
     }
 
     fn texture(&self, lookup: &Lookup, globals: &Globals) -> Option<[f32; 4]> {
@@ -69,11 +82,12 @@ impl Host for Textures {
             s: lookup.s,
             t: lookup.t,
             first_channel: lookup.first_channel,
+            changes: lookup.changes,
             globals: OcGlobals::from(*globals),
         };
         let mut rgba = [0.0; 4];
-        // SAFETY: the callback is what `oc_engine_set_texture` demands; both pointers live through the call.
-        let found = unsafe { (self.call)(self.user, &asked, rgba.as_mut_ptr()) };
+        // SAFETY: the callback is what `oc_engine_set_host` demands; both pointers live through the call.
+        let found = unsafe { self.texture?(self.user, &asked, rgba.as_mut_ptr()) };
         (found != 0).then_some(rgba)
     }
 }
@@ -141,27 +155,16 @@ pub unsafe extern "C" fn oc_engine_set_include_dir(engine: *mut OcEngine, path: 
     })
 }
 
-/// Lets the scripts compiled from here on look up textures; null: none are found.
+/// Says what the host answers the scripts compiled from here on. Replaces what was said before.
 ///
 /// # Safety
-/// `texture` and `user` may be used from any thread, as long as the process lasts.
+/// `host` is null, which is an error, or points to an `oc_host` whose callback and `user` may be used from any thread, as
+/// long as the process lasts.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn oc_engine_set_texture(
-    engine: *mut OcEngine,
-    texture: OcTextureFn,
-    user: *mut c_void,
-) -> OcStatus {
-    /// Finds no picture.
-    struct Nothing;
-    impl Host for Nothing {
-        fn answers(&self, _: Subject) -> bool {
-            false
-        }
-    }
+pub unsafe extern "C" fn oc_engine_set_host(engine: *mut OcEngine, host: *const OcHost) -> OcStatus {
     change(engine, |engine| {
-        Ok(match texture {
-            Some(call) => engine.host(Textures { call, user }),
-            None => engine.host(Nothing),
-        })
+        // SAFETY: the caller promises one.
+        let host = unsafe { memory::read(host, "host") }?;
+        Ok(engine.host(host))
     })
 }

@@ -5,11 +5,50 @@ use super::memory;
 use super::status::{Failure, OcStatus, guard};
 use crate::audit;
 use crate::engine::{Error, OwnedBsdf};
-use crate::globals::Globals;
+use crate::globals::{Differentials, Globals};
 use crate::ir::Value;
 use glam::Vec3;
 use std::ffi::c_char;
 use std::sync::{Mutex, RwLock};
+
+/// What changes by one pixel to the right (`x`) and one pixel down (`y`): of the position, of the direction the ray travels,
+/// of the surface parameters. Read only where the engine's `oc_host` says so.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OcDifferentials {
+    /// Of the position.
+    pub dpdx: [f32; 3],
+    /// Of the position, downward.
+    pub dpdy: [f32; 3],
+    /// Of the direction the ray travels.
+    pub didx: [f32; 3],
+    /// Of the direction the ray travels, downward.
+    pub didy: [f32; 3],
+    /// Of u.
+    pub dudx: f32,
+    /// Of u, downward.
+    pub dudy: f32,
+    /// Of v.
+    pub dvdx: f32,
+    /// Of v, downward.
+    pub dvdy: f32,
+}
+
+impl From<Differentials> for OcDifferentials {
+    fn from(d: Differentials) -> OcDifferentials {
+        let Differentials { dpdx, dpdy, didx, didy, dudx, dudy, dvdx, dvdy } = d;
+        let [dpdx, dpdy, didx, didy] = [dpdx, dpdy, didx, didy].map(|v| v.to_array());
+        OcDifferentials { dpdx, dpdy, didx, didy, dudx, dudy, dvdx, dvdy }
+    }
+}
+
+impl From<OcDifferentials> for Differentials {
+    fn from(d: OcDifferentials) -> Differentials {
+        let OcDifferentials { dpdx, dpdy, didx, didy, dudx, dudy, dvdx, dvdy } = d;
+        let [dpdx, dpdy, didx, didy] = [dpdx, dpdy, didx, didy].map(Vec3::from_array);
+        Differentials { dpdx, dpdy, didx, didy, dudx, dudy, dvdx, dvdy }
+    }
+}
 
 /// The shading point, in world space. Fill it with `oc_globals_default` first, then set what is known.
 #[repr(C)]
@@ -33,6 +72,8 @@ pub struct OcGlobals {
     pub time: f32,
     /// Not 0: the ray hit the back of the surface, and the host turned the normals toward the viewer.
     pub backfacing: i32,
+    /// How it differs from the points that the neighbouring pixels show.
+    pub differentials: OcDifferentials,
 }
 
 impl From<Globals> for OcGlobals {
@@ -47,6 +88,7 @@ impl From<Globals> for OcGlobals {
             v: g.v,
             time: g.time,
             backfacing: i32::from(g.backfacing),
+            differentials: g.differentials.into(),
         }
     }
 }
@@ -63,6 +105,7 @@ impl From<OcGlobals> for Globals {
             v: g.v,
             time: g.time,
             backfacing: g.backfacing != 0,
+            differentials: g.differentials.into(),
             ..Globals::default()
         }
     }
