@@ -1,8 +1,6 @@
 //! Albedo of rough surfaces: what one bounce between facets leaves over, and how much of it is reflected or refracted.
 //!
-//! A hemisphere rule would miss a lobe a ten-thousandth of a radian wide. Here E is the mean over visible facets of what
-//! each passes on, an integral over the unit square that is as smooth at α = 1e-4 as at 1; along each line of it the
-//! places where light goes below the horizon, or is totally reflected, are found by bisection.
+//! E at one direction comes from `visible.rs`; `fill.rs` spreads it over the table.
 //!
 //! `missing` is M(ω) ≤ 1 − E(ω), never above it: what the lobe may scatter once more without gaining. Nodes lie over
 //! μ^¼, and over the azimuth for a stretched surface or over α^¼ where α varies from point to point. There M is 0

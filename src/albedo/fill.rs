@@ -1,7 +1,8 @@
 //! Values of a smooth function over a grid, computed where they must be and interpolated where that will do.
 //!
-//! The grid is covered with panels of 9 by 9 of its points. Where a polynomial through every second of them tells those
-//! between, the polynomial through all fills the panel; else it is halved, at last down to every point of the grid.
+//! The grid is covered with panels of 9 by 9 of its points. Where polynomials through every fourth and every second of them
+//! show that the one through all tells what lies between, that one fills the panel; else it is halved, at last down to
+//! every point of the grid.
 
 use super::curve::parallel;
 
@@ -99,7 +100,7 @@ impl Panel {
         })
     }
 
-    /// Halves, or quarters, if every second point does not tell the others; `None` if it does.
+    /// Halves, or quarters, if the polynomial may miss the truth by more than `tolerance`; `None` if not.
     fn parts<const N: usize>(self, lattice: &[[Estimate; N]], tolerance: f64) -> Option<Vec<Panel>> {
         let across = self.node.points();
         let off = |side: Side, start: usize, step: usize| {
@@ -133,8 +134,9 @@ impl Panel {
     }
 }
 
-/// How far the polynomial through nine values in a row may lie from the truth: as far below what the one through every
-/// second misses as that lies below what the one through every fourth misses, and once more. At an edge nothing falls.
+/// How far the polynomial through nine values in a row may lie from the truth. From every fourth value to every second the
+/// miss falls by some factor, and by its square on to all of them if f is smooth; four times the result is said. At an edge it
+/// hardly falls.
 fn missed<'v, const N: usize>(value: impl Fn(usize) -> &'v [Estimate; N]) -> f64 {
     let by = |stride: usize| {
         let (points, mut most) = (STEPS / stride + 1, 0.0f64);

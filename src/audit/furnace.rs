@@ -56,12 +56,14 @@ pub fn albedo_until<'m, S: Scalar>(
     let total = |value: [f64; 3], error: f64| Albedo { value: std::array::from_fn(|c| value[c] + delta[c]), error };
     let groups = groups(&held);
     let charts: Vec<Chart<S>> = groups.iter().map(|g| g.chart(w)).collect();
-    let hints = hints(&held);
-    let cells: Vec<(usize, [f64; 4])> = charts
-        .iter()
-        .enumerate()
-        .flat_map(|(index, chart)| chart.cells_at(&hints).into_iter().map(move |c| (index, c)))
-        .collect();
+    let mut cells: Vec<Vec<[f64; 4]>> = charts.iter().map(Chart::cells).collect();
+    let mut points: Vec<Vec<[f64; 2]>> = vec![vec![]; charts.len()];
+    for lobe in (0..held.lobe_count()).filter(|lobe| held.lobe_kind(*lobe).0.class() == LobeClass::Scatter) {
+        let index = group_of(&groups, held.lobe_frame(lobe), held.lobe_kind(lobe).0);
+        let hints: Vec<[f64; 2]> = hints(&held, lobe).into_iter().map(|w| charts[index].place(w)).collect();
+        cells[index] = split_at(&cells[index], &hints, CROWD);
+        points[index].extend(hints);
+    }
     let f = |index: usize, x: f64, y: f64| {
         let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
         let (moving, weight) = charts[index].direction(x, y);
@@ -71,6 +73,12 @@ pub fn albedo_until<'m, S: Scalar>(
         };
         part.map(|x| x.to_f64() * weight)
     };
+    let lit = |index: usize, c: &[f64; 4]| {
+        let within = |p: &[f64; 2]| (c[0]..=c[1]).contains(&p[0]) && (c[2]..=c[3]).contains(&p[1]);
+        points[index].iter().any(within) || few(c).any(|[x, y]| f(index, x, y) != [0.0; 3])
+    };
+    let numbered = cells.iter().enumerate().flat_map(|(index, cells)| cells.iter().map(move |c| (index, *c)));
+    let cells: Vec<(usize, [f64; 4])> = numbered.filter(|(index, c)| lit(*index, c)).collect();
     let i = integrate_until(&cells, tolerance, f, |value, error| enough(&total(value, error)));
     total(i.value, i.error)
 }
@@ -89,11 +97,11 @@ pub struct LobeShare {
 /// Where the energy goes, lobe by lobe, for ωo = `w`.
 pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolerance: Tolerance) -> Vec<LobeShare> {
     let bsdf = subject.bsdf(w);
-    let hints = hints(&bsdf);
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
-            let cells = chart.cells_at(&hints);
+            let hints: Vec<[f64; 2]> = hints(&bsdf, lobe).into_iter().map(|w| chart.place(w)).collect();
+            let cells = split_at(&chart.cells(), &hints, CROWD);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
@@ -109,14 +117,25 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
         .collect()
 }
 
-/// Directions that light from (or toward) the held direction goes to: where to look for peaks.
-fn hints<S: Scalar>(held: &Bsdf<'_, S>) -> Vec<[S; 3]> {
+/// More directions of one lobe than this in a cell are split up.
+const CROWD: usize = 16;
+
+/// Where a cell to which no light was seen to go is looked at before it is integrated: if it is black there, as below a
+/// surface, it is left out.
+fn few(cell: &[f64; 4]) -> impl Iterator<Item = [f64; 2]> {
+    let [x0, x1, y0, y1] = *cell;
+    let at = |lo: f64, hi: f64, k: usize| lo + (hi - lo) * [0.03, 0.21, 0.5, 0.79, 0.97][k];
+    (0..25).map(move |k| [at(x0, x1, k / 5), at(y0, y1, k % 5)])
+}
+
+/// Directions that one lobe sends light from (or toward) the held direction to: where to look for its peak.
+fn hints<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<[S; 3]> {
     let sample = |k: usize| {
-        // A rank-1 lattice in three dimensions.
-        let u = [0.819_172_5, 0.671_043_6, 0.549_700_5].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
-        held.sample(u).filter(|s| !s.flags.delta).map(|s| s.wi)
+        // A rank-1 lattice in two dimensions.
+        let u = [0.754_877_67, 0.569_840_29].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
+        held.lobe_sample(lobe, u)
     };
-    (0..256).filter_map(sample).collect()
+    (0..64).filter_map(sample).collect()
 }
 
 /// Lobes that are integrated together, because their edges and ridges lie alike.
@@ -173,7 +192,7 @@ struct Chart<S> {
 #[derive(Clone, Copy, Debug)]
 enum Layout {
     /// (u, φ): z = ±u², graded toward the horizon, and φ from the azimuth of the held direction on. Split where that
-    /// puts edges: at its azimuth, at right angles to it, and at its own polar angle, where the two α of a layer meet.
+    /// puts edges: at its azimuth, and at its own polar angle, where the two α of a layer meet.
     AboutNormal { azimuth: f64, split: f64 },
     /// (u, v): the angles θ along the x axis and φ around it. A thread's ridge lies at θ = −θ of the held direction, as
     /// narrow as a thousandth: the cells meet there and grow from it with the cube. φ is graded toward the horizon and
@@ -203,24 +222,17 @@ impl<S: Scalar> Chart<S> {
     fn cells(&self) -> Vec<[f64; 4]> {
         match self.layout {
             Layout::AboutNormal { split, .. } => {
-                let quarter = |k: usize| {
-                    let (a, b) = (k as f64 * FRAC_PI_2, (k + 1) as f64 * FRAC_PI_2);
+                let half = |(a, b)| {
                     // u < 0 is the lower hemisphere, black for most lobes.
                     [[-1.0, 0.0, a, b], [0.0, split, a, b], [split, 1.0, a, b]]
                 };
-                (0..4).flat_map(quarter).collect()
+                [(0.0, PI), (PI, 2.0 * PI)].into_iter().flat_map(half).collect()
             }
             Layout::AroundThread { split, .. } => {
                 let half = |(lo, hi)| [[lo, hi, -1.0, split], [lo, hi, split, 1.0], [lo, hi, 1.0, 3.0]];
                 [(-1.0, 0.0), (0.0, 1.0)].into_iter().flat_map(half).collect()
             }
         }
-    }
-
-    /// [`cells`](Self::cells), split among directions where light is known to go.
-    fn cells_at(&self, hints: &[[S; 3]]) -> Vec<[f64; 4]> {
-        let points: Vec<[f64; 2]> = hints.iter().map(|w| self.place(*w)).collect();
-        split_at(&self.cells(), &points, 16)
     }
 
     /// Where a direction in world space lies in the chart.
