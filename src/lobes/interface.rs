@@ -135,24 +135,33 @@ impl<S: Real> Interface<S> {
         let sign = if self.eta > 1.0 { -1.0 } else { 1.0 };
         let sum = |a: L, b: L| b.turned(sign * self.eta, a, sign);
         let h = V3::new(sum(out.x, inn.x), sum(out.y, inn.y), sum(out.z, inn.z));
-        let (c_out, c_in) = (out.dot(h), -inn.dot(h));
         let length2 = h.length_squared().max(L::c(1e-12));
         let n2 = pick(L::c(self.eta * self.eta), L::one());
-        let met = c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
-        let jacobian = L::select(met, c_out * c_in * n2 / (length2 * length2), L::zero());
+        let met = |c_out: L, c_in: L| c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
+        let jacobian =
+            |c_out: L, c_in: L| L::select(met(c_out, c_in), c_out * c_in * n2 / (length2 * length2), L::zero());
         if let Some(law) = &self.colored {
-            // The cosine outside, and what it lacks of 1 from the sine: |out × h| is η·|out × in|.
+            // The cosines, and what the outer one lacks of 1 from the sine: |out × h| is η·|out × in|. In double precision,
+            // because a grazing cosine is a small difference and unlike Fresnel's, this 1 − F does not vanish there.
+            let [c_out, c_in, sine2] = L::by_lane([out.x, out.y, out.z, inn.x, inn.y, inn.z], |[x, y, z, u, v, w]| {
+                let cross = [y * w - z * v, z * u - x * w, x * v - y * u];
+                let (out2, in2) = (x * x + y * y + z * z, u * u + v * v + w * w);
+                let both = x * u + y * v + z * w;
+                let c_out = sign * (self.eta * both + out2);
+                let c_in = -sign * (self.eta * in2 + both);
+                [c_out, c_in, self.eta * self.eta * cross.iter().map(|c| c * c).sum::<f64>()]
+            });
             let cos = c_out / length2.sqrt();
-            let sine2 = L::c(self.eta * self.eta) * out.cross(inn).length_squared() / length2;
-            let rest = law.rest(cos, sine2 / (L::one() + cos.max(L::zero())));
-            return (h, jacobian, rest.map(|r| L::select(met, r, L::zero())));
+            let rest = law.rest(cos, sine2 / (length2 * (L::one() + cos.max(L::zero()))));
+            return (h, jacobian(c_out, c_in), rest.map(|r| L::select(met(c_out, c_in), r, L::zero())));
         }
+        let (c_out, c_in) = (out.dot(h), -inn.dot(h));
         // 1 − F from both cosines, in any unit: nothing cancels toward the critical angle.
         let eta = L::c(self.eta);
         let (s, p) = (eta.mul_add(c_in, c_out), eta.mul_add(c_out, c_in));
         let both = L::one() / s.sq().max(L::c(1e-12)) + L::one() / p.sq().max(L::c(1e-12));
-        let passed = L::select(met, L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
-        (h, jacobian, [passed; 3])
+        let passed = L::select(met(c_out, c_in), L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
+        (h, jacobian(c_out, c_in), [passed; 3])
     }
 
     /// F of the facet that mirrors ωo to ωi.
