@@ -286,7 +286,7 @@ fn nothing_panics() {
     for kind in LobeKind::ALL {
         let mut b = Builder::new().precision(Precision::FAST);
         let args = kind.spec().params.iter().map(|p| match p.ty {
-            ParamTy::String => (p.name, Arg::Word(p.options[0].to_owned())),
+            ParamTy::String => (p.name, Arg::Word(p.options.first().copied().unwrap_or("word").to_owned())),
             ParamTy::Float | ParamTy::Int => (p.name, Arg::Input(b.float(f32::NAN))),
             _ => (p.name, Arg::Input(b.triple([f32::NAN; 3]))),
         });
