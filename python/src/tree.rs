@@ -40,23 +40,11 @@ fn node<'py>(py: Python<'py>, tree: &ClosureTree, id: NodeId) -> PyResult<Bound<
         }
         Node::Add(..) => {
             dict.set_item("kind", "add")?;
-            let terms: PyResult<Vec<_>> = terms(tree, id).into_iter().map(|t| node(py, tree, t)).collect();
+            let terms: PyResult<Vec<_>> = tree.terms(id).into_iter().map(|t| node(py, tree, t)).collect();
             dict.set_item("terms", terms?)?;
         }
     }
     Ok(dict)
-}
-
-/// The terms of a sum in order, sums within it dissolved: a long sum is not a deep one.
-fn terms(tree: &ClosureTree, id: NodeId) -> Vec<NodeId> {
-    let (mut found, mut waiting) = (Vec::new(), vec![id]);
-    while let Some(id) = waiting.pop() {
-        match tree.node(id) {
-            Node::Add(a, b) => waiting.extend([b, a]),
-            _ => found.push(id),
-        }
-    }
-    found
 }
 
 fn params<'py>(py: Python<'py>, kind: LobeKind, values: &[f32]) -> PyResult<Bound<'py, PyDict>> {

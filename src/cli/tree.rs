@@ -102,7 +102,7 @@ fn node(tree: &ClosureTree, root: NodeId) -> Value {
                 Node::Mul(weight, c) => steps.extend([Step::Mul(weight), Step::Visit(c)]),
                 Node::Layer { top, base } => steps.extend([Step::Layer, Step::Visit(base), Step::Visit(top)]),
                 Node::Add(..) => {
-                    let terms = terms(tree, id);
+                    let terms = tree.terms(id);
                     steps.push(Step::Add(terms.len()));
                     steps.extend(terms.into_iter().rev().map(Step::Visit));
                 }
@@ -122,18 +122,6 @@ fn node(tree: &ClosureTree, root: NodeId) -> Value {
         }
     }
     done.pop().unwrap_or(Value::Null)
-}
-
-/// The terms of a sum, in order, sums within it dissolved.
-fn terms(tree: &ClosureTree, id: NodeId) -> Vec<NodeId> {
-    let (mut found, mut waiting) = (Vec::new(), vec![id]);
-    while let Some(id) = waiting.pop() {
-        match tree.node(id) {
-            Node::Add(a, b) => waiting.extend([b, a]),
-            _ => found.push(id),
-        }
-    }
-    found
 }
 
 fn lobe(kind: LobeKind, values: &[f32]) -> Value {
@@ -178,7 +166,7 @@ fn outline(tree: &ClosureTree, text: &mut String) {
             }
             Node::Add(..) => {
                 text.push_str("sum\n");
-                waiting.extend(terms(tree, id).into_iter().rev().map(|t| (t, depth + 1, String::new())));
+                waiting.extend(tree.terms(id).into_iter().rev().map(|t| (t, depth + 1, String::new())));
             }
         }
     }

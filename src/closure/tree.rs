@@ -273,6 +273,19 @@ impl ClosureTree {
         })
     }
 
+    /// The terms of a sum, in order, sums within it dissolved; of anything else that alone. Not recursive: a long sum is not
+    /// a deep one.
+    pub fn terms(&self, id: NodeId) -> Vec<NodeId> {
+        let (mut found, mut waiting) = (Vec::new(), vec![id]);
+        while let Some(id) = waiting.pop() {
+            match self.node(id) {
+                Node::Add(a, b) => waiting.extend([b, a]),
+                _ => found.push(id),
+            }
+        }
+        found
+    }
+
     /// What a node comes to, written out.
     pub fn size(&self, id: NodeId) -> Size {
         self.nodes[id.index()].1
