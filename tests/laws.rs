@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Stack, at, block, blocks, turned};
+use common::{Stack, at, block, blocks, rounding, turned};
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::{Side, Tolerance, albedo, chi2, reciprocity_error};
 use overcoat::closure::ClosureTree;
@@ -11,6 +11,7 @@ use overcoat::lobes::{AnyLobe, LobeKind, forms};
 use overcoat::optics::{F32x8, Scalar, V3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock};
@@ -67,7 +68,9 @@ fn reciprocal_lobes_are_reciprocal() {
 #[test]
 fn no_lobe_gains_and_every_bound_holds() {
     let tolerance = Tolerance { error: 1e-5, evaluations: 60_000 };
-    for (kind, values) in instances() {
+    // The longest of these tests: on every core.
+    let instances: Vec<_> = instances().collect();
+    instances.into_par_iter().for_each(|(kind, values)| {
         let stack = single::<f32>(kind, &values);
         for cos in [1.0, 0.8, 0.4, 0.1, 0.02, 1e-3, 1e-5, -0.3, -1.0] {
             let w = turned(cos);
@@ -89,7 +92,7 @@ fn no_lobe_gains_and_every_bound_holds() {
                 }
             }
         }
-    }
+    });
 }
 
 #[test]
@@ -106,8 +109,11 @@ fn single_precision_follows_double() {
         }
         let peak = pairs.iter().map(|p| p.1).fold(0.0, f64::max);
         for (f, truth, a, b) in pairs {
-            if truth > 1e-6 * peak {
-                assert!((f / truth - 1.0).abs() < 1e-4, "{kind:?} {values:?}: {f} for {truth} at {a:?}, {b:?}");
+            if truth > 1e-6 * peak && (f / truth - 1.0).abs() >= 1e-4 {
+                let [a, b] = [a, b].map(|w| w.map(f64::from));
+                let unavoidable = rounding(|a, b| exact.bsdf(a).f(b)[0], a, b);
+                let far = (f - truth).abs() - unavoidable;
+                assert!(far < 1e-4 * truth, "{kind:?} {values:?}: {f} for {truth} ± {unavoidable} at {a:?}, {b:?}");
             }
         }
     }

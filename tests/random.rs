@@ -1,6 +1,9 @@
 //! A million random parameters and directions per lobe: finite, not negative, and single precision follows double.
 //! The tables are those for parameters that are not known before shading, the hardest case.
 
+mod common;
+
+use common::rounding;
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::chi2::direction;
 use overcoat::lobes::registry::{LobeClass, ParamSpec, ParamTy};
@@ -103,16 +106,30 @@ fn single_precision_follows_double_everywhere() {
                 let b = AnyLobe::new(kind, &block, V3::<f64>::from_f32(wo), &exact);
                 for _ in 0..10 {
                     let wi = direction::<f32>(&mut rng);
-                    let f = f64::from(a.f(V3::<f32>::from_f32(wi), &fast)[0]);
-                    pairs.push((f, b.f(V3::<f64>::from_f32(wi), &exact)[0], wo, wi));
+                    let (f, truth) = (a.f(V3::<f32>::from_f32(wi), &fast), b.f(V3::<f64>::from_f32(wi), &exact));
+                    // A dark channel is compared with the brightest: next to it an error is not seen.
+                    let bright = truth[0].max(truth[1]).max(truth[2]);
+                    pairs.extend((0..3).map(|c| (f64::from(f[c]), truth[c], bright, c, wo, wi)));
                 }
             }
             let peak = pairs.iter().map(|p| p.1).fold(0.0, f64::max);
-            for (f, truth, wo, wi) in pairs {
-                if truth > 1e-6 * peak {
-                    let error = (f / truth - 1.0).abs();
+            for (f, truth, bright, c, wo, wi) in pairs {
+                if bright > 1e-6 * peak {
+                    let error = (f - truth).abs() / bright;
                     worst = worst.max(error);
-                    assert!(error < 1e-4, "{kind:?} {block:?}: {f} for {truth} at {wo:?}, {wi:?}");
+                    if error >= 1e-4 {
+                        let [a, b] = [wo, wi].map(|w| w.map(f64::from));
+                        let of = |a: [f64; 3], b: [f64; 3]| {
+                            let [a, b] = [a, b].map(|w| V3::new(w[0], w[1], w[2]));
+                            AnyLobe::new(kind, &block, a, &exact).f(b, &exact)[c]
+                        };
+                        let unavoidable = rounding(of, a, b);
+                        let far = (f - truth).abs() - unavoidable;
+                        assert!(
+                            far < 1e-4 * bright,
+                            "{kind:?} {block:?}: {f} for {truth} ± {unavoidable} at {wo:?}, {wi:?}"
+                        );
+                    }
                 }
             }
         }

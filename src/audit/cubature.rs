@@ -72,8 +72,17 @@ pub fn integrate_until(
 /// No cell is cut narrower.
 const NARROWEST: f64 = 1e-10;
 
+/// A rectangle, and whether it is known not to be black: a point lies in it or just beside it.
+pub(super) type Patch = ([f64; 4], bool);
+
 /// Splits `cells` until none holds more than `most` of the `points` (where a peak too narrow to be found was sampled).
 pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f64; 4]> {
+    let patches: Vec<Patch> = cells.iter().map(|c| (*c, false)).collect();
+    split(&patches, points, most).into_iter().map(|(cell, _)| cell).collect()
+}
+
+/// [`split_at`], telling in which parts points lie.
+pub(super) fn split(cells: &[Patch], points: &[[f64; 2]], most: usize) -> Vec<Patch> {
     // A peak at an edge lies on both sides of it, wherever its points fell: those close by count in both.
     let fold = |x: f64, lo: f64, hi: f64| {
         let folded = if x < lo {
@@ -88,9 +97,9 @@ pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f6
     let of = |c: &[f64; 4]| -> Vec<[f64; 2]> {
         points.iter().filter_map(|p| Some([fold(p[0], c[0], c[1])?, fold(p[1], c[2], c[3])?])).collect()
     };
-    let mut open: Vec<([f64; 4], Vec<[f64; 2]>)> = cells.iter().map(|c| (*c, of(c))).collect();
+    let mut open: Vec<(Patch, Vec<[f64; 2]>)> = cells.iter().map(|c| (*c, of(&c.0))).collect();
     let mut done = Vec::new();
-    while let Some((cell, mut points)) = open.pop() {
+    while let Some(((cell, lit), mut points)) = open.pop() {
         let ends = |axis: usize| {
             let of = points.iter().map(|p| p[axis]);
             of.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
@@ -115,14 +124,14 @@ pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f6
             (points.len() > most && middle > lo + NARROWEST && middle < hi - NARROWEST).then_some(middle)
         };
         let Some(at) = at else {
-            done.push(cell);
+            done.push((cell, lit || !points.is_empty()));
             continue;
         };
         let (mut below, mut above) = (cell, cell);
         (below[2 * axis + 1], above[2 * axis]) = (at, at);
         let (under, over) = points.into_iter().partition(|p| p[axis] < at);
-        open.push((below, under));
-        open.push((above, over));
+        open.push(((below, lit), under));
+        open.push(((above, lit), over));
     }
     done
 }

@@ -4,10 +4,10 @@
 //! Each lobe is integrated in its own frame, where its horizon is an edge of the domain; delta lobes are added
 //! exactly.
 
-use super::cubature::{Tolerance, integrate, integrate_until, split_at};
+use super::cubature::{Patch, Tolerance, integrate, integrate_until, split, split_at};
 use super::{Subject, dot};
 use crate::closure::Bsdf;
-use crate::closure::bsdf::Cosine;
+use crate::closure::parts::Cosine;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{LobeKind, Rgb};
 use crate::optics::{Frame, Scalar, V3};
@@ -57,13 +57,11 @@ pub fn albedo_until<'m, S: Scalar>(
     let total = |value: [f64; 3], error: f64| Albedo { value: std::array::from_fn(|c| value[c] + delta[c]), error };
     let groups = groups(&held);
     let charts: Vec<Chart<S>> = groups.iter().map(|g| g.chart(w)).collect();
-    let mut cells: Vec<Vec<[f64; 4]>> = charts.iter().map(Chart::cells).collect();
-    let mut points: Vec<Vec<[f64; 2]>> = vec![vec![]; charts.len()];
+    let unknown = |chart: &Chart<S>| chart.cells().into_iter().map(|c| (c, false)).collect();
+    let mut cells: Vec<Vec<Patch>> = charts.iter().map(unknown).collect();
     for lobe in (0..held.lobe_count()).filter(|lobe| held.lobe_kind(*lobe).0.class() == LobeClass::Scatter) {
         let index = group_of(&groups, held.lobe_frame(lobe), held.lobe_kind(lobe).0);
-        let hints: Vec<[f64; 2]> = hints(&held, lobe).into_iter().map(|w| charts[index].place(w)).collect();
-        cells[index] = split_at(&cells[index], &hints, CROWD);
-        points[index].extend(hints);
+        cells[index] = split(&cells[index], &charts[index].hints(&held, lobe), CROWD);
     }
     let f = |index: usize, x: f64, y: f64| {
         let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
@@ -74,12 +72,9 @@ pub fn albedo_until<'m, S: Scalar>(
         };
         part.map(|x| x.to_f64() * weight)
     };
-    let lit = |index: usize, c: &[f64; 4]| {
-        let within = |p: &[f64; 2]| (c[0]..=c[1]).contains(&p[0]) && (c[2]..=c[3]).contains(&p[1]);
-        points[index].iter().any(within) || few(c).any(|[x, y]| f(index, x, y) != [0.0; 3])
-    };
-    let numbered = cells.iter().enumerate().flat_map(|(index, cells)| cells.iter().map(move |c| (index, *c)));
-    let cells: Vec<(usize, [f64; 4])> = numbered.filter(|(index, c)| lit(*index, c)).collect();
+    let lit = |index: usize, (c, lit): &Patch| *lit || few(c).any(|[x, y]| f(index, x, y) != [0.0; 3]);
+    let numbered = cells.iter().enumerate().flat_map(|(index, cells)| cells.iter().map(move |c| (index, c)));
+    let cells: Vec<(usize, [f64; 4])> = numbered.filter(|(index, c)| lit(*index, c)).map(|(i, c)| (i, c.0)).collect();
     let i = integrate_until(&cells, tolerance, f, |value, error| enough(&total(value, error)));
     total(i.value, i.error)
 }
@@ -101,8 +96,7 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
-            let hints: Vec<[f64; 2]> = hints(&bsdf, lobe).into_iter().map(|w| chart.place(w)).collect();
-            let cells = split_at(&chart.cells(), &hints, CROWD);
+            let cells = split_at(&chart.cells(), &chart.hints(&bsdf, lobe), CROWD);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
@@ -130,7 +124,7 @@ fn few(cell: &[f64; 4]) -> impl Iterator<Item = [f64; 2]> {
 }
 
 /// Directions that one lobe sends light from (or toward) the held direction to: where to look for its peak.
-fn hints<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<[S; 3]> {
+fn directions<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<[S; 3]> {
     let sample = |k: usize| {
         // A rank-1 lattice in two dimensions.
         let u = [0.754_877_67, 0.569_840_29].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
@@ -220,6 +214,20 @@ impl Layout {
 }
 
 impl<S: Scalar> Chart<S> {
+    /// Where the light of one lobe was seen to go.
+    fn hints(&self, held: &Bsdf<'_, S>, lobe: usize) -> Vec<[f64; 2]> {
+        let places = directions(held, lobe).into_iter().map(|w| self.place(w));
+        match self.layout {
+            // The mirror direction lies where the azimuth begins and ends: a peak there is half at either.
+            Layout::AboutNormal { .. } => {
+                places.flat_map(|[u, y]| [[u, y], [u, y - 2.0 * PI], [u, y + 2.0 * PI]]).collect()
+            }
+            // The cells meet on the ridge.
+            Layout::AroundThread { .. } => places.flat_map(|[x, y]| [[x, y], [-x, y]]).collect(),
+        }
+    }
+
+    /// The whole sphere.
     fn cells(&self) -> Vec<[f64; 4]> {
         match self.layout {
             Layout::AboutNormal { split, .. } => {

@@ -6,9 +6,9 @@
 use super::balance::Balanced;
 use super::flatten::Layering;
 use super::layer::{LayerStack, LayeringRule, TintRule};
+use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
-use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
 use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch};
 use smallvec::SmallVec;
@@ -40,30 +40,6 @@ pub struct Sample<S = f32> {
     pub eta: S,
     /// How wide the lobe that was chosen scatters: 0 one direction, 1 as wide as a diffuse surface.
     pub roughness: S,
-}
-
-/// Something a material tells the renderer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Signal<S = f32> {
-    /// What it stands for.
-    pub kind: SignalKind,
-    /// Its weight, dimmed by the layers above it.
-    pub value: Rgb<S>,
-}
-
-/// Scattering below the surface that a material asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SubsurfacePart<S = f32> {
-    /// What comes back of white light from all around, weights and layers toward ωo included.
-    pub albedo: Rgb<S>,
-    /// The shading normal, world space.
-    pub normal: [S; 3],
-    /// Mean free path per channel, in the scene's unit.
-    pub radius: [f32; 3],
-    /// Mean cosine of scattering, in [−1, 1].
-    pub anisotropy: f32,
-    /// Index of refraction of the medium.
-    pub ior: f32,
 }
 
 /// What kind of scattering a sample is.
@@ -134,17 +110,6 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
     pub(crate) signals: SmallVec<[Signal<S>; 8]>,
-}
-
-/// Which cosine multiplies f.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Cosine {
-    /// |N·ωi|: light arriving from ωi, seen from ωo.
-    Light,
-    /// |N·ωo|: the adjoint, f·(ηo/ηi)².
-    View,
-    /// None: f·ηo/ηi, which is symmetric where f is reciprocal.
-    None,
 }
 
 impl<'m, S: Scalar> Bsdf<'m, S> {
@@ -310,30 +275,6 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         self.emission
     }
 
-    /// What the material tells the renderer beside light: `holdout`, `background` and `debug`, one entry per kind and name.
-    pub fn signals(&self) -> &[Signal<S>] {
-        &self.signals
-    }
-
-    pub(crate) fn signal(&mut self, kind: SignalKind, value: Rgb<S>) {
-        match self.signals.iter_mut().find(|s| s.kind == kind) {
-            Some(s) => s.value = std::array::from_fn(|c| s.value[c] + value[c]),
-            None => self.signals.push(Signal { kind, value }),
-        }
-    }
-
-    /// What is to be scattered below the surface, for a renderer that does so itself. The BSDF counts it as diffuse.
-    pub fn subsurface(&self) -> impl Iterator<Item = SubsurfacePart<S>> {
-        self.lobes.iter().filter_map(|l| match &l.lobe {
-            AnyLobe::Subsurface(lobe) => {
-                let (radius, anisotropy, ior) = lobe.medium();
-                let n = self.frames[l.frame as usize].n;
-                Some(SubsurfacePart { albedo: l.albedo, normal: [n.x, n.y, n.z], radius, anisotropy, ior })
-            }
-            _ => None,
-        })
-    }
-
     /// Whether nothing is scattered at all.
     pub fn is_black(&self) -> bool {
         self.lobes.is_empty()
@@ -366,99 +307,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         self.walk(vector(w), true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
     }
 
-    /// What the delta lobes scatter, exactly: the part of the albedo that `eval` leaves out.
-    pub fn delta_albedo(&self) -> Rgb<S> {
-        self.delta_parts().fold([S::zero(); 3], |sum, (_, part)| std::array::from_fn(|c| sum[c] + part[c]))
-    }
-
-    /// The delta lobes: the direction each scatters to (world space) and how much, weights and layers included.
-    pub fn delta_parts(&self) -> impl Iterator<Item = ([S; 3], Rgb<S>)> {
-        (0..self.lobes.len()).filter_map(|i| Some((self.lobe_delta_direction(i)?, self.lobe_delta(i, true)?)))
-    }
-
-    /// The direction delta lobe `index` scatters to, in world space; `None` for other lobes.
-    pub(crate) fn lobe_delta_direction(&self, index: usize) -> Option<[S; 3]> {
-        let (local, _) = self.lobes[index].lobe.delta()?;
-        let wi = self.frames[self.lobes[index].frame as usize].to_world(local);
-        Some([wi.x, wi.y, wi.z])
-    }
-
-    /// The direction lobe `index` scatters to for two uniform numbers, in world space; `None` for delta lobes, where it
-    /// scatters nothing that way, and for lobes that do not count.
-    pub(crate) fn lobe_sample(&self, index: usize, u: [S; 2]) -> Option<[S; 3]> {
-        let l = &self.lobes[index];
-        if l.delta || l.probability <= S::zero() {
-            return None;
-        }
-        let local = l.lobe.sample(u);
-        let wi = self.frames[l.frame as usize].to_world(local);
-        (l.lobe.pdf(local) > S::zero()).then_some([wi.x, wi.y, wi.z])
-    }
-
-    /// What delta lobe `index` scatters, with or without the layers above it (which look at ωo and at its own
-    /// direction); `None` for other lobes.
-    pub(crate) fn lobe_delta(&self, index: usize, layered: bool) -> Option<Rgb<S>> {
-        let l = &self.lobes[index];
-        let (local, part) = l.lobe.delta()?;
-        let wi = self.frames[l.frame as usize].to_world(local);
-        let mut scale = [S::one(); 3];
-        if layered {
-            self.walk(wi, false, |i, l: &FlatLobe<'m, S>, s: Rgb<S>, local: V3<S>, bound| {
-                if i == index {
-                    scale = s
-                }
-                l.bound(local, bound)
-            });
-        }
-        Some(std::array::from_fn(|c| l.weight[c] * scale[c] * part[c]))
-    }
-
-    /// w·f·|cos θi| of lobe `index` alone, with or without the layers above it.
-    pub(crate) fn lobe_part(&self, index: usize, wi: V3<S>, layered: bool) -> Rgb<S> {
-        let mut result = [S::zero(); 3];
-        self.walk(wi, false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-            if i == index {
-                let scale = if layered { scale } else { [S::one(); 3] };
-                result = weighted(l, scale, local, Cosine::Light);
-            }
-            l.bound(local, bound)
-        });
-        result
-    }
-
-    /// Like `eval`, its cosine chosen, with only the lobes whose frame and kind `pick` accepts.
-    pub(crate) fn part(&self, wi: V3<S>, cosine: Cosine, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
-        let mut sum = [S::zero(); 3];
-        self.walk(wi, false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-            if pick(&self.frames[l.frame as usize], l.kind) {
-                let part = weighted(l, scale, local, cosine);
-                for c in 0..3 {
-                    sum[c] += part[c];
-                }
-            }
-            l.bound(local, bound)
-        });
-        sum.map(finite)
-    }
-
-    /// The frames in use, one per distinct normal and tangent.
-    pub fn frames(&self) -> &[Frame<S>] {
-        &self.frames
-    }
-
-    /// The frame of lobe `index`.
-    pub fn lobe_frame(&self, index: usize) -> &Frame<S> {
-        &self.frames[self.lobes[index].frame as usize]
-    }
-
-    /// What lobe `index` is, and the place in the program that made it.
-    pub fn lobe_kind(&self, index: usize) -> (LobeKind, u32) {
-        (self.lobes[index].kind, self.lobes[index].site)
-    }
-
     /// Visits every lobe, then gives the bound on the whole if it is asked for.
     #[inline(always)]
-    fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
+    pub(crate) fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
         match (self.depth, self.layering.tint) {
             (0, _) | (1, TintRule::Largest) => self.walk_within::<S, 1, 1>(wi, bound, visit),
             (2..=4, TintRule::Largest) => self.walk_within::<S, 4, 1>(wi, bound, visit),
@@ -542,7 +393,7 @@ impl<'m> Bsdf<'m, f32> {
 
 /// Is shown every lobe: its index, what the layers above it scale it by for this ωi, the direction in its frame, and
 /// whether its bound there is asked for, which is then to be returned.
-trait Visit<'m, S: Real, L> {
+pub(crate) trait Visit<'m, S: Real, L> {
     fn lobe(&mut self, index: usize, lobe: &FlatLobe<'m, S>, scale: Rgb<L>, local: V3<L>, bound: bool) -> Rgb<L>;
 }
 
@@ -621,25 +472,15 @@ impl<L: Real> Eval<L> {
 
 impl<S: Scalar> FlatLobe<'_, S> {
     /// The bound at a direction, if it is asked for.
-    fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
+    pub(super) fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
         if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }
     }
 }
 
 /// A million terms of weight 1e30 are still a number.
 #[inline(always)]
-fn finite<L: Real>(x: L) -> L {
+pub(super) fn finite<L: Real>(x: L) -> L {
     x.min(L::c(f32::MAX as f64))
-}
-
-fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine) -> Rgb<S> {
-    let f = l.lobe.f(local, l.curve);
-    let cos = match cosine {
-        Cosine::Light => local.z.abs().min(S::one()),
-        Cosine::View => l.cos_o * l.lobe.relative_eta(local).sq(),
-        Cosine::None => l.lobe.relative_eta(local),
-    };
-    std::array::from_fn(|c| l.weight[c] * scale[c] * f[c] * cos)
 }
 
 /// Directions that are not finite, or far from unit length, become zero: in every surface at once, hence black.

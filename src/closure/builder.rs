@@ -12,7 +12,7 @@ use super::tree::{ClosureTree, NodeId, TreeError};
 use crate::albedo::Precision;
 use crate::globals::Globals;
 use crate::lobes::LobeKind;
-use crate::lobes::registry::{ParamSpec, ParamTy};
+use crate::lobes::registry::{ParamSpec, ParamTy, option_index};
 use crate::optics::V3;
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -298,14 +298,19 @@ impl Builder {
     fn numbers(&self, p: &ParamSpec, arg: &Arg) -> Result<From3, Option<String>> {
         let expected = || {
             let words = p.options.join("`, `");
-            if p.ty == ParamTy::String { format!("one of `{words}`") } else { format!("a {}", p.ty.name()) }
+            match p.ty {
+                ParamTy::String if p.options.is_empty() => "a word".to_owned(),
+                ParamTy::String => format!("one of `{words}`"),
+                ty => format!("a {}", ty.name()),
+            }
         };
         match arg {
             Arg::Input(i) if i.builder != self.id => Err(None),
-            Arg::Word(word) => match p.options.iter().position(|o| o == word) {
-                Some(index) => Ok(From3::Known([index as f32; 3])),
-                None => Err(Some(expected())),
-            },
+            Arg::Word(word) if p.ty == ParamTy::String => {
+                let index = option_index(p.options, word).ok_or_else(|| Some(expected()))?;
+                Ok(From3::Known([index as f32; 3]))
+            }
+            Arg::Word(_) => Err(Some(expected())),
             _ if p.ty == ParamTy::String => Err(Some(expected())),
             Arg::Input(i) if i.width as usize > p.ty.slots() => Err(Some(expected())),
             Arg::Triple(_) if p.ty.slots() < 3 => Err(Some(expected())),
