@@ -104,7 +104,9 @@ fn single_precision_follows_double_everywhere() {
                 let wo = direction::<f32>(&mut rng);
                 let a = AnyLobe::new(kind, &block, V3::from_f32(wo), &fast);
                 let b = AnyLobe::new(kind, &block, V3::<f64>::from_f32(wo), &exact);
-                for _ in 0..10 {
+                // What reflects less than a thousandth is black.
+                let count = if b.albedo(V3::<f64>::from_f32(wo), &exact).iter().any(|a| *a > 1e-3) { 10 } else { 0 };
+                for _ in 0..count {
                     let wi = direction::<f32>(&mut rng);
                     let (f, truth) = (a.f(V3::<f32>::from_f32(wi), &fast), b.f(V3::<f64>::from_f32(wi), &exact));
                     // A dark channel is compared with the brightest: next to it an error is not seen.

@@ -1,7 +1,8 @@
 //! Adaptive integration over rectangles, three channels at a time.
 //!
 //! A tensor product of Gauss–Kronrod (7, 15) rules; the rectangle with the largest error is halved along the
-//! direction that contributes most to it, until the sum of errors is below the tolerance. Deterministic.
+//! direction that contributes most to it, until the sum of errors is below the tolerance. Where points are known not to be
+//! black and the rule finds nothing, what they stand for is an error too. Deterministic.
 
 use crate::albedo::quadrature::{GAUSS, KRONROD, NODES};
 use std::collections::BinaryHeap;
@@ -32,22 +33,95 @@ impl Default for Tolerance {
     }
 }
 
+/// A rectangle to integrate over, with places where the integrand is known not to be black.
+#[derive(Clone, Debug)]
+pub(super) struct Patch {
+    /// `[x0, x1, y0, y1]`.
+    pub corners: [f64; 4],
+    /// Places, and the part of the integral that each stands for.
+    pub points: Vec<([f64; 2], f64)>,
+}
+
+impl Patch {
+    fn width(&self, axis: usize) -> f64 {
+        self.corners[2 * axis + 1] - self.corners[2 * axis]
+    }
+
+    /// Two, `axis` cut at `at`.
+    fn cut(self, axis: usize, at: f64) -> [Patch; 2] {
+        let (mut below, mut above) = (self.corners, self.corners);
+        (below[2 * axis + 1], above[2 * axis]) = (at, at);
+        let (under, over) = self.points.into_iter().partition(|p| p.0[axis] < at);
+        [Patch { corners: below, points: under }, Patch { corners: above, points: over }]
+    }
+
+    /// What its points stand for, if almost nothing of that was found: light that lies between the places looked at.
+    fn missed(&self, found: [f64; 3]) -> f64 {
+        let told: f64 = self.points.iter().map(|p| p.1).sum();
+        let found = found[0].max(found[1]).max(found[2]);
+        let wide = self.width(0).max(self.width(1)) > SEEN;
+        if found < 0.01 * told && wide { told } else { 0.0 }
+    }
+
+    /// The direction in which its points lie closest together, measured in the cell; a single one is closed in from both.
+    fn narrow(&self) -> usize {
+        match self.points.len() {
+            0 | 1 => usize::from(self.width(1) > self.width(0)),
+            _ => usize::from(self.spread(1) < self.spread(0)),
+        }
+    }
+
+    /// Where to cut it so that the flanks of the peak its points show get cells of their own.
+    fn cut_at(&mut self, axis: usize, most: usize) -> Option<f64> {
+        let (lo, hi) = (self.corners[2 * axis], self.corners[2 * axis + 1]);
+        let (first, last) = self.ends(axis);
+        // A little at a time.
+        let reach = (last - first).max(0.125 * (hi - lo)).max(NARROWEST);
+        if self.points.len() < 2 {
+            None
+        } else if first - lo > 2.0 * reach {
+            // What is empty is cut off.
+            Some(first - reach)
+        } else if hi - last > 2.0 * reach {
+            Some(last + reach)
+        } else {
+            self.points.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));
+            let middle = self.points[self.points.len() / 2].0[axis];
+            (self.points.len() > most && middle > lo + NARROWEST && middle < hi - NARROWEST).then_some(middle)
+        }
+    }
+
+    /// How far its points lie apart, over its width.
+    fn spread(&self, axis: usize) -> f64 {
+        let (lo, hi) = self.ends(axis);
+        (hi - lo) / self.width(axis)
+    }
+
+    /// The first and the last of its points along an axis.
+    fn ends(&self, axis: usize) -> (f64, f64) {
+        let of = self.points.iter().map(|p| p.0[axis]);
+        of.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+    }
+}
+
+/// In cells narrower than this nothing is looked for: directions of single precision are no closer.
+const SEEN: f64 = 1e-6;
+
 /// Integrates `f(x, y)` over the rectangles with corners `[x0, x1, y0, y1]`.
 pub fn integrate(cells: &[[f64; 4]], tolerance: Tolerance, mut f: impl FnMut(f64, f64) -> [f64; 3]) -> Integral {
-    let cells: Vec<(usize, [f64; 4])> = cells.iter().map(|c| (0, *c)).collect();
-    integrate_until(&cells, tolerance, |_, x, y| f(x, y), |_, _| false)
+    let patch = |c: &[f64; 4]| (0, Patch { corners: *c, points: Vec::new() });
+    integrate_until(cells.iter().map(patch).collect(), tolerance, |_, x, y| f(x, y), |_, _| false)
 }
 
 /// Integrates several functions `f(which, x, y)`, each over the rectangles that come with its number, and adds them up.
 /// Stops early where `enough(value, error)` says so.
-pub fn integrate_until(
-    cells: &[(usize, [f64; 4])],
+pub(super) fn integrate_until(
+    patches: Vec<(usize, Patch)>,
     tolerance: Tolerance,
     mut f: impl FnMut(usize, f64, f64) -> [f64; 3],
     enough: impl Fn([f64; 3], f64) -> bool,
 ) -> Integral {
-    let mut heap: BinaryHeap<Cell> =
-        cells.iter().map(|&(which, corners)| Cell::measure(which, corners, &mut f)).collect();
+    let mut heap: BinaryHeap<Cell> = patches.into_iter().map(|(which, p)| Cell::measure(which, p, &mut f)).collect();
     let mut evaluations = heap.len() * 225;
     loop {
         let error: f64 = heap.iter().map(|c| c.error).sum();
@@ -62,8 +136,9 @@ pub fn integrate_until(
         let Some(worst) = heap.pop() else {
             return Integral { value: [0.0; 3], error: 0.0, exhausted: false };
         };
+        let which = worst.which;
         for half in worst.halves() {
-            heap.push(Cell::measure(worst.which, half, &mut f));
+            heap.push(Cell::measure(which, half, &mut f));
         }
         evaluations += 450;
     }
@@ -72,18 +147,17 @@ pub fn integrate_until(
 /// No cell is cut narrower.
 const NARROWEST: f64 = 1e-10;
 
-/// A rectangle, and whether it is known not to be black: a point lies in it or just beside it.
-pub(super) type Patch = ([f64; 4], bool);
-
 /// Splits `cells` until none holds more than `most` of the `points` (where a peak too narrow to be found was sampled).
 pub fn split_at(cells: &[[f64; 4]], points: &[[f64; 2]], most: usize) -> Vec<[f64; 4]> {
-    let patches: Vec<Patch> = cells.iter().map(|c| (*c, false)).collect();
-    split(&patches, points, most).into_iter().map(|(cell, _)| cell).collect()
+    let patches = cells.iter().map(|c| Patch { corners: *c, points: Vec::new() }).collect();
+    let points: Vec<_> = points.iter().map(|p| (*p, 0.0)).collect();
+    split(patches, &points, most).into_iter().map(|p| p.corners).collect()
 }
 
-/// [`split_at`], telling in which parts points lie.
-pub(super) fn split(cells: &[Patch], points: &[[f64; 2]], most: usize) -> Vec<Patch> {
-    // A peak at an edge lies on both sides of it, wherever its points fell: those close by count in both.
+/// [`split_at`] for patches, which take the points, each with the part of the integral that it stands for.
+pub(super) fn split(patches: Vec<Patch>, points: &[([f64; 2], f64)], most: usize) -> Vec<Patch> {
+    // A peak at an edge lies on both sides of it, wherever its points fell: those close by are looked for in both, but
+    // stand for nothing in the other.
     let fold = |x: f64, lo: f64, hi: f64| {
         let folded = if x < lo {
             2.0 * lo - x
@@ -94,60 +168,43 @@ pub(super) fn split(cells: &[Patch], points: &[[f64; 2]], most: usize) -> Vec<Pa
         };
         ((lo..hi).contains(&x) || (folded - x).abs() < 0.02 * (hi - lo)).then_some(folded)
     };
-    let of = |c: &[f64; 4]| -> Vec<[f64; 2]> {
-        points.iter().filter_map(|p| Some([fold(p[0], c[0], c[1])?, fold(p[1], c[2], c[3])?])).collect()
+    let of = |c: &[f64; 4]| -> Vec<([f64; 2], f64)> {
+        let within = |&(p, part): &([f64; 2], f64)| {
+            let folded = [fold(p[0], c[0], c[1])?, fold(p[1], c[2], c[3])?];
+            Some((folded, if folded == p { part } else { 0.0 }))
+        };
+        points.iter().filter_map(within).collect()
     };
-    let mut open: Vec<(Patch, Vec<[f64; 2]>)> = cells.iter().map(|c| (*c, of(&c.0))).collect();
+    // The points that were there before are carried along.
+    let mut open: Vec<(Patch, Patch)> =
+        patches.into_iter().map(|old| (Patch { corners: old.corners, points: of(&old.corners) }, old)).collect();
     let mut done = Vec::new();
-    while let Some(((cell, lit), mut points)) = open.pop() {
-        let ends = |axis: usize| {
-            let of = points.iter().map(|p| p[axis]);
-            of.fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
-        };
-        let spread = |axis: usize| (ends(axis).1 - ends(axis).0) / (cell[2 * axis + 1] - cell[2 * axis]);
+    while let Some((mut new, mut old)) = open.pop() {
         // Across the direction in which the points lie closest together, measured in the cell.
-        let axis = usize::from(points.len() > 1 && spread(1) < spread(0));
-        let (lo, hi) = (cell[2 * axis], cell[2 * axis + 1]);
-        let (first, last) = ends(axis);
-        // A little at a time, so that the flanks of the peak get cells of their own.
-        let reach = (last - first).max(0.125 * (hi - lo)).max(NARROWEST);
-        let at = if points.len() < 2 {
-            None
-        } else if first - lo > 2.0 * reach {
-            // What is empty is cut off.
-            Some(first - reach)
-        } else if hi - last > 2.0 * reach {
-            Some(last + reach)
-        } else {
-            points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));
-            let middle = points[points.len() / 2][axis];
-            (points.len() > most && middle > lo + NARROWEST && middle < hi - NARROWEST).then_some(middle)
-        };
-        let Some(at) = at else {
-            done.push((cell, lit || !points.is_empty()));
-            continue;
-        };
-        let (mut below, mut above) = (cell, cell);
-        (below[2 * axis + 1], above[2 * axis]) = (at, at);
-        let (under, over) = points.into_iter().partition(|p| p[axis] < at);
-        open.push(((below, lit), under));
-        open.push(((above, lit), over));
+        let axis = new.narrow();
+        match new.cut_at(axis, most) {
+            Some(at) => open.extend(new.cut(axis, at).into_iter().zip(old.cut(axis, at))),
+            None => {
+                old.points.append(&mut new.points);
+                done.push(old);
+            }
+        }
     }
     done
 }
 
 struct Cell {
     which: usize,
-    corners: [f64; 4],
+    patch: Patch,
     value: [f64; 3],
     error: f64,
-    /// Halve along y rather than x.
-    along_y: bool,
+    /// Halve along y (1) or x (0).
+    axis: usize,
 }
 
 impl Cell {
-    fn measure(which: usize, corners: [f64; 4], f: &mut impl FnMut(usize, f64, f64) -> [f64; 3]) -> Cell {
-        let [x0, x1, y0, y1] = corners;
+    fn measure(which: usize, patch: Patch, f: &mut impl FnMut(usize, f64, f64) -> [f64; 3]) -> Cell {
+        let [x0, x1, y0, y1] = patch.corners;
         let (cx, hx) = (0.5 * (x0 + x1), 0.5 * (x1 - x0));
         let (cy, hy) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
         // Kronrod × Kronrod, Gauss × Kronrod, Kronrod × Gauss.
@@ -168,14 +225,15 @@ impl Cell {
         let value = sums[0].map(|s| s * area);
         let gap = |other: [f64; 3]| (0..3).map(|c| (sums[0][c] - other[c]).abs()).fold(0.0, f64::max) * area;
         let (ex, ey) = (gap(sums[1]), gap(sums[2]));
-        let error = if value.iter().all(|v| v.is_finite()) { ex + ey } else { f64::INFINITY };
-        Cell { which, corners, value, error, along_y: ey > ex }
+        let missed = patch.missed(value);
+        let axis = if missed > 0.0 { patch.narrow() } else { usize::from(ey > ex) };
+        let error = if value.iter().all(|v| v.is_finite()) { ex + ey + missed } else { f64::INFINITY };
+        Cell { which, patch, value, error, axis }
     }
 
-    fn halves(&self) -> [[f64; 4]; 2] {
-        let [x0, x1, y0, y1] = self.corners;
-        let (mx, my) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
-        if self.along_y { [[x0, x1, y0, my], [x0, x1, my, y1]] } else { [[x0, mx, y0, y1], [mx, x1, y0, y1]] }
+    fn halves(self) -> [Patch; 2] {
+        let [lo, hi] = [0, 1].map(|end| self.patch.corners[2 * self.axis + end]);
+        self.patch.cut(self.axis, 0.5 * (lo + hi))
     }
 }
 
@@ -200,7 +258,7 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, o: &Self) -> std::cmp::Ordering {
-        let place = |c: &Cell| (c.which, c.corners.map(f64::to_bits));
+        let place = |c: &Cell| (c.which, c.patch.corners.map(f64::to_bits));
         self.error.total_cmp(&o.error).then_with(|| place(self).cmp(&place(o)))
     }
 }

@@ -57,11 +57,13 @@ pub fn albedo_until<'m, S: Scalar>(
     let total = |value: [f64; 3], error: f64| Albedo { value: std::array::from_fn(|c| value[c] + delta[c]), error };
     let groups = groups(&held);
     let charts: Vec<Chart<S>> = groups.iter().map(|g| g.chart(w)).collect();
-    let unknown = |chart: &Chart<S>| chart.cells().into_iter().map(|c| (c, false)).collect();
+    let unknown =
+        |chart: &Chart<S>| chart.cells().into_iter().map(|corners| Patch { corners, points: Vec::new() }).collect();
     let mut cells: Vec<Vec<Patch>> = charts.iter().map(unknown).collect();
     for lobe in (0..held.lobe_count()).filter(|lobe| held.lobe_kind(*lobe).0.class() == LobeClass::Scatter) {
         let index = group_of(&groups, held.lobe_frame(lobe), held.lobe_kind(lobe).0);
-        cells[index] = split(&cells[index], &charts[index].hints(&held, lobe), CROWD);
+        let hints = charts[index].hints(&held, lobe);
+        cells[index] = split(std::mem::take(&mut cells[index]), &hints, CROWD);
     }
     let f = |index: usize, x: f64, y: f64| {
         let pick = |frame: &Frame<S>, kind: LobeKind| group_of(&groups, frame, kind) == index;
@@ -72,10 +74,11 @@ pub fn albedo_until<'m, S: Scalar>(
         };
         part.map(|x| x.to_f64() * weight)
     };
-    let lit = |index: usize, (c, lit): &Patch| *lit || few(c).any(|[x, y]| f(index, x, y) != [0.0; 3]);
-    let numbered = cells.iter().enumerate().flat_map(|(index, cells)| cells.iter().map(move |c| (index, c)));
-    let cells: Vec<(usize, [f64; 4])> = numbered.filter(|(index, c)| lit(*index, c)).map(|(i, c)| (i, c.0)).collect();
-    let i = integrate_until(&cells, tolerance, f, |value, error| enough(&total(value, error)));
+    let lit =
+        |index: usize, p: &Patch| !p.points.is_empty() || few(&p.corners).any(|[x, y]| f(index, x, y) != [0.0; 3]);
+    let numbered = cells.into_iter().enumerate().flat_map(|(index, cells)| cells.into_iter().map(move |c| (index, c)));
+    let cells = numbered.filter(|(index, patch)| lit(*index, patch)).collect();
+    let i = integrate_until(cells, tolerance, f, |value, error| enough(&total(value, error)));
     total(i.value, i.error)
 }
 
@@ -96,7 +99,8 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
-            let cells = split_at(&chart.cells(), &chart.hints(&bsdf, lobe), CROWD);
+            let hints: Vec<[f64; 2]> = chart.hints(&bsdf, lobe).into_iter().map(|h| h.0).collect();
+            let cells = split_at(&chart.cells(), &hints, CROWD);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
                 None => {
@@ -112,8 +116,10 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
         .collect()
 }
 
+/// Directions of each lobe that tell where to look.
+const HINTS: usize = 256;
 /// More directions of one lobe than this in a cell are split up.
-const CROWD: usize = 16;
+const CROWD: usize = 64;
 
 /// Where a cell to which no light was seen to go is looked at before it is integrated: if it is black there, as below a
 /// surface, it is left out.
@@ -123,14 +129,17 @@ fn few(cell: &[f64; 4]) -> impl Iterator<Item = [f64; 2]> {
     (0..25).map(move |k| [at(x0, x1, k / 5), at(y0, y1, k % 5)])
 }
 
-/// Directions that one lobe sends light from (or toward) the held direction to: where to look for its peak.
-fn directions<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<[S; 3]> {
+/// Directions that one lobe sends light from (or toward) the held direction to, and how much of it each stands for: where
+/// to look for its peak.
+fn directions<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<(V3<S>, f64)> {
     let sample = |k: usize| {
         // A rank-1 lattice in two dimensions.
         let u = [0.754_877_67, 0.569_840_29].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
-        held.lobe_sample(lobe, u)
+        let (w, pdf) = held.lobe_sample(lobe, u)?;
+        let [r, g, b] = held.lobe_part(lobe, w, true).map(S::to_f64);
+        Some((w, r.max(g).max(b) / (pdf.to_f64() * HINTS as f64)))
     };
-    (0..64).filter_map(sample).collect()
+    (0..HINTS).filter_map(sample).collect()
 }
 
 /// Lobes that are integrated together, because their edges and ridges lie alike.
@@ -214,16 +223,20 @@ impl Layout {
 }
 
 impl<S: Scalar> Chart<S> {
-    /// Where the light of one lobe was seen to go.
-    fn hints(&self, held: &Bsdf<'_, S>, lobe: usize) -> Vec<[f64; 2]> {
-        let places = directions(held, lobe).into_iter().map(|w| self.place(w));
+    /// Where the light of one lobe was seen to go, and how much of it each place stands for. More such places beside edges
+    /// of the chart that a peak may lie across stand for nothing.
+    fn hints(&self, held: &Bsdf<'_, S>, lobe: usize) -> Vec<([f64; 2], f64)> {
+        let places = directions(held, lobe).into_iter().map(|(w, share)| (self.place(w), share));
         match self.layout {
-            // The mirror direction lies where the azimuth begins and ends: a peak there is half at either.
-            Layout::AboutNormal { .. } => {
-                places.flat_map(|[u, y]| [[u, y], [u, y - 2.0 * PI], [u, y + 2.0 * PI]]).collect()
-            }
+            // The mirror direction lies where the azimuth begins and ends.
+            Layout::AboutNormal { .. } => places
+                .flat_map(|([u, y], share)| [([u, y], share), ([u, y - 2.0 * PI], 0.0), ([u, y + 2.0 * PI], 0.0)])
+                .collect(),
             // The cells meet on the ridge.
-            Layout::AroundThread { .. } => places.flat_map(|[x, y]| [[x, y], [-x, y]]).collect(),
+            Layout::AroundThread { .. } => places
+                .flat_map(|([x, y], share)| [Some(([x, y], share)), (x.abs() < 0.2).then_some(([-x, y], 0.0))])
+                .flatten()
+                .collect(),
         }
     }
 
@@ -245,8 +258,8 @@ impl<S: Scalar> Chart<S> {
     }
 
     /// Where a direction in world space lies in the chart.
-    fn place(&self, w: [S; 3]) -> [f64; 2] {
-        let local = self.frame.to_local(vector(w)).map(|x| x.to_f64());
+    fn place(&self, w: V3<S>) -> [f64; 2] {
+        let local = self.frame.to_local(w).map(|x| x.to_f64());
         match self.layout {
             Layout::AboutNormal { azimuth, .. } => {
                 let turn = (local.y.atan2(local.x) - azimuth + PI).rem_euclid(2.0 * PI);

@@ -82,16 +82,16 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         Some([wi.x, wi.y, wi.z])
     }
 
-    /// The direction lobe `index` scatters to for two uniform numbers, in world space; `None` for delta lobes, where it
-    /// scatters nothing that way, and for lobes that do not count.
-    pub(crate) fn lobe_sample(&self, index: usize, u: [S; 2]) -> Option<[S; 3]> {
+    /// The direction lobe `index` scatters to for two uniform numbers, in world space, and its density over solid angle;
+    /// `None` for delta lobes, where it scatters nothing that way, and for lobes that do not count.
+    pub(crate) fn lobe_sample(&self, index: usize, u: [S; 2]) -> Option<(V3<S>, S)> {
         let l = &self.lobes[index];
         if l.delta || l.probability <= S::zero() {
             return None;
         }
         let local = l.lobe.sample(u);
-        let wi = self.frames[l.frame as usize].to_world(local);
-        (l.lobe.pdf(local) > S::zero()).then_some([wi.x, wi.y, wi.z])
+        let pdf = l.lobe.pdf(local);
+        (pdf > S::zero()).then(|| (self.frames[l.frame as usize].to_world(local), pdf))
     }
 
     /// What delta lobe `index` scatters, with or without the layers above it (which look at ωo and at its own

@@ -38,13 +38,12 @@ pub fn conductor<L: Real>(n: L, k: L, c: L) -> L {
     // Of real ± modulus only the sum of equal signs is formed.
     let large = half * (modulus + real.abs());
     let small = half * half * product / large.max(L::c(1e-30));
-    let a2 = L::select(real.ge(L::zero()), large, small).max(L::zero());
-    let a = a2.sqrt();
-    let two_ac = L::c(2.0) * a * c;
-    let sum = modulus + c2;
-    let s = (sum - two_ac) / (sum + two_ac).max(L::c(1e-30));
-    let (u, v) = (c2.mul_add(modulus, s2 * s2), two_ac * s2);
-    let p = (u - v) / (u + v).max(L::c(1e-30));
+    let up = real.ge(L::zero());
+    let a = L::select(up, large, small).safe_sqrt();
+    let b2 = L::select(up, small, large).max(L::zero());
+    // As squares: next to n = 1 their sums less twice the product would leave no digits.
+    let ratio = |x: L, y: L, rest: L| ((x - y).sq() + rest) / ((x + y).sq() + rest).max(L::c(1e-30));
+    let (s, p) = (ratio(a, c, b2), ratio(a * c, s2, b2 * c2));
     (half * s * (L::one() + p)).clamp(L::zero(), L::one())
 }
 

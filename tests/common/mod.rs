@@ -66,8 +66,8 @@ pub fn turned(cos: f64) -> [f32; 3] {
     [(sin * 0.8) as f32, (sin * 0.6) as f32, cos as f32]
 }
 
-/// How much `f`, in double precision, changes where rounding in single precision moves one component of a direction by one
-/// unit in the last place: an error that no way of computing in single precision avoids.
+/// How much `f`, in double precision, may change where rounding in single precision moves every component of both directions
+/// by one unit in the last place: an error that no way of computing in single precision avoids.
 pub fn rounding(f: impl Fn([f64; 3], [f64; 3]) -> f64, a: [f64; 3], b: [f64; 3]) -> f64 {
     let truth = f(a, b);
     let moved = |i: usize, by: f64| {
@@ -77,7 +77,7 @@ pub fn rounding(f: impl Fn([f64; 3], [f64; 3]) -> f64, a: [f64; 3], b: [f64; 3])
         (f(a, b) - truth).abs()
     };
     let step = f64::from(f32::EPSILON);
-    (0..6).flat_map(|i| [moved(i, step), moved(i, -step)]).fold(0.0, f64::max)
+    (0..6).map(|i| moved(i, step).max(moved(i, -step))).sum()
 }
 
 /// One lobe on its own, with N = +z and T = +x where it takes them.
