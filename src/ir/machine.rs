@@ -42,7 +42,7 @@ impl Program {
                     let [a, b, c] = args.map(|reg| read(cells, reg, 3));
                     write(cells, dst, width as usize, ops::apply(op, n as usize, a, b, c));
                 }
-                Instr::Call { .. } | Instr::Noise { .. } => self.function(*instr, cells),
+                Instr::Call { .. } | Instr::Noise { .. } => self.function(instr, cells),
                 Instr::OptionIndex { options, dst, name } => {
                     let name = strings.get(cells[name as usize]);
                     // A name that is only known now and unknown to the lobe means its first option.
@@ -111,9 +111,10 @@ impl Program {
         }
     }
 
-    /// Calls a function.
-    fn function(&self, instr: Instr, cells: &mut [u32]) {
-        match instr {
+    /// Calls a function. Apart from [`run`](Self::run), whose loop would have no registers left beside it.
+    #[inline(never)]
+    fn function(&self, instr: &Instr, cells: &mut [u32]) {
+        match *instr {
             Instr::Call { function, width, count, dst, args } => {
                 let mut values = [[0; 3]; MAX_ARGS];
                 let pairs = self.args[args as usize..].chunks_exact(2).take(count as usize);
@@ -124,24 +125,42 @@ impl Program {
                 write(cells, dst, width as usize, value);
             }
             Instr::Noise { kind, dimensions, periodic, width, dst, args } => {
-                let n = dimensions as usize;
-                let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
-                let regs = &self.args[args as usize..];
-                for (x, reg) in at.x.iter_mut().zip(&regs[..n]) {
-                    *x = [f32::from_bits(cells[*reg as usize])];
-                }
-                if periodic {
-                    for (period, reg) in at.period.iter_mut().zip(&regs[n..2 * n]) {
-                        *period = [f32::from_bits(cells[*reg as usize])];
+                let (kind, regs) = (kind as usize, &self.args[args as usize..]);
+                let done = !periodic
+                    && match dimensions {
+                        1 => near_noise::<1>(kind, regs, cells, dst, width),
+                        2 => near_noise::<2>(kind, regs, cells, dst, width),
+                        3 => near_noise::<3>(kind, regs, cells, dst, width),
+                        _ => near_noise::<4>(kind, regs, cells, dst, width),
+                    };
+                if !done {
+                    let n = dimensions as usize;
+                    let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
+                    let periods = if periodic { &mut at.period[..n] } else { &mut [] };
+                    for (x, reg) in at.x[..n].iter_mut().chain(periods).zip(regs) {
+                        *x = [f32::from_bits(cells[*reg as usize])];
                     }
-                }
-                for channel in 0..u32::from(width) {
-                    cells[(dst + channel) as usize] = noise::noise(kind as usize, &at, channel)[0].to_bits();
+                    for channel in 0..u32::from(width) {
+                        cells[(dst + channel) as usize] = noise::noise(kind, &at, channel)[0].to_bits();
+                    }
                 }
             }
             _ => {}
         }
     }
+}
+
+/// Noise where it is worked out fastest; false, and nothing done, elsewhere.
+#[inline(always)]
+fn near_noise<const N: usize>(kind: usize, regs: &[u32], cells: &mut [u32], dst: u32, width: u8) -> bool {
+    let x: [f32; N] = std::array::from_fn(|d| f32::from_bits(cells[regs[d] as usize]));
+    let near = noise::is_near(kind, &x);
+    if near {
+        for channel in 0..u32::from(width) {
+            cells[(dst + channel) as usize] = noise::near(kind, x, channel).to_bits();
+        }
+    }
+    near
 }
 
 impl Call {

@@ -8,13 +8,14 @@ pub mod fold;
 pub mod layers;
 mod merge;
 pub mod needs;
+mod starts;
 
 use super::body::{Body, ExprId, ExprKind, Root, Stmt, VarId};
 use std::collections::HashSet;
 
-/// A folded body without what nothing needs: dead code, and values that are only handed on.
+/// A folded body without what nothing needs done at a point: dead code, values that are only handed on, known starts.
 pub fn tighten(body: Body) -> Body {
-    merge::merge(dead::remove(copies::read_through(body)))
+    starts::take(merge::merge(dead::remove(copies::read_through(body))))
 }
 
 /// Calls `see` for each expression that the value of a run depends on, the run's root first.
@@ -117,17 +118,22 @@ mod tests {
         // What is copied changes afterwards, in a branch, in a loop, in both.
         ("float a = u; float b = a + v; float c = b; b = b * 2; Ci = (b + 3 * c) * diffuse(N);", 11, 11),
         ("float b = u + v; float c = b; if (u > 0.4) b = v; Ci = (b + 3 * c) * diffuse(N);", 13, 13),
-        ("float b = u + v; float c = b; for (int i = 0; i < 9 * u; i++) { c = b; b += c; } Ci = (b + 3 * c) * diffuse(N);", 21, 21),
-        ("float a = u, b = v; for (int i = 0; i < 9 * u; i++) { float t = a; a = b; b = t + 0.1; } Ci = (a + 3 * b) * diffuse(N);", 22, 22),
+        ("float b = u + v; float c = b; for (int i = 0; i < 9 * u; i++) { c = b; b += c; } Ci = (b + 3 * c) * diffuse(N);", 21, 20),
+        ("float a = u, b = v; for (int i = 0; i < 9 * u; i++) { float t = a; a = b; b = t + 0.1; } Ci = (a + 3 * b) * diffuse(N);", 22, 21),
         // Break and continue.
         ("float s = 0; for (int i = 0; i < 20 * u; i++) { float t = s; if (i > 7) break; if (t > v) { s = t * 0.5; continue; }
-          s = t + u; } Ci = s * diffuse(N);", 29, 28),
+          s = t + u; } Ci = s * diffuse(N);", 29, 25),
         // An array read by name and by index.
-        ("float a[3] = {u, v, 1}; float b = a[1]; a[(int)(u * 3)] = 7; float c = b + a[1]; Ci = (c + 3 * b) * diffuse(N);", 14, 14),
+        ("float a[3] = {u, v, 1}; float b = a[1]; a[(int)(u * 3)] = 7; float c = b + a[1]; Ci = (c + 3 * b) * diffuse(N);", 14, 13),
         // Output arguments.
         ("void g(output float x, float y) { x = x * 2 + y; } float a = u; g(a, v); float b = a; g(b, a); Ci = (a + b) * diffuse(N);", 13, 11),
         // Derivatives.
         ("float f(float x) { float y = x * x; return y; } float a = f(u + v); Ci = abs(Dx(a) + Dy(a) + a) * diffuse(N);", 41, 23),
+        // Values that are known at first, and one that is not first.
+        ("float s = 2; color c = color(1, 0.5, 0); float t = u; if (t > 0.5) { s = t; c = t; } t = 3; Ci = (s + t) * c * diffuse(N);", 13, 11),
+        ("float a[3] = {1, 2, 3}; float b = a[(int)(3 * u)]; a[1] = 4; Ci = (b + a[(int)(3 * v)]) * diffuse(N);", 17, 14),
+        // Choices.
+        ("float a = u; a = u > 0.5 ? (v > a ? a + 1 : a * 2) : a - 3; Ci = abs(a) * diffuse(N);", 16, 16),
         // Closures and triples.
         ("closure color f(color c) { closure color r = c * diffuse(N); return r; } closure color d = f(color(u, v, 1));
           closure color e = d; d = d + translucent(N); Ci = e + 0.5 * d;", 13, 10),
