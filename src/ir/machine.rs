@@ -126,23 +126,26 @@ impl Program {
             }
             Instr::Noise { kind, dimensions, periodic, width, dst, args } => {
                 let (kind, regs) = (kind as usize, &self.args[args as usize..]);
-                let done = !periodic
-                    && match dimensions {
-                        1 => near_noise::<1>(kind, regs, cells, dst, width),
-                        2 => near_noise::<2>(kind, regs, cells, dst, width),
-                        3 => near_noise::<3>(kind, regs, cells, dst, width),
-                        _ => near_noise::<4>(kind, regs, cells, dst, width),
+                if width == 1 && !periodic {
+                    let near = match dimensions {
+                        1 => near_noise::<1>(kind, regs, cells),
+                        2 => near_noise::<2>(kind, regs, cells),
+                        3 => near_noise::<3>(kind, regs, cells),
+                        _ => near_noise::<4>(kind, regs, cells),
                     };
-                if !done {
-                    let n = dimensions as usize;
-                    let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
-                    let periods = if periodic { &mut at.period[..n] } else { &mut [] };
-                    for (x, reg) in at.x[..n].iter_mut().chain(periods).zip(regs) {
-                        *x = [f32::from_bits(cells[*reg as usize])];
+                    if let Some(value) = near {
+                        cells[dst as usize] = value.to_bits();
+                        return;
                     }
-                    for channel in 0..u32::from(width) {
-                        cells[(dst + channel) as usize] = noise::noise(kind, &at, channel)[0].to_bits();
-                    }
+                }
+                let n = dimensions as usize;
+                let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
+                let periods = if periodic { &mut at.period[..n] } else { &mut [] };
+                for (x, reg) in at.x[..n].iter_mut().chain(periods).zip(regs) {
+                    *x = [f32::from_bits(cells[*reg as usize])];
+                }
+                for channel in 0..u32::from(width) {
+                    cells[(dst + channel) as usize] = noise::noise(kind, &at, channel)[0].to_bits();
                 }
             }
             _ => {}
@@ -150,17 +153,16 @@ impl Program {
     }
 }
 
-/// Noise where it is worked out fastest; false, and nothing done, elsewhere.
+/// Noise of one number where it is worked out fastest.
 #[inline(always)]
-fn near_noise<const N: usize>(kind: usize, regs: &[u32], cells: &mut [u32], dst: u32, width: u8) -> bool {
-    let x: [f32; N] = std::array::from_fn(|d| f32::from_bits(cells[regs[d] as usize]));
-    let near = noise::is_near(kind, &x);
-    if near {
-        for channel in 0..u32::from(width) {
-            cells[(dst + channel) as usize] = noise::near(kind, x, channel).to_bits();
-        }
+fn near_noise<const N: usize>(kind: usize, regs: &[u32], cells: &[u32]) -> Option<f32> {
+    let regs = regs.first_chunk::<N>()?;
+    // A loop: `map` is a call.
+    let mut x = [0.0; N];
+    for d in 0..N {
+        x[d] = f32::from_bits(cells[regs[d] as usize]);
     }
-    near
+    noise::is_near(kind, &x).then(|| noise::near(kind, x))
 }
 
 impl Call {
