@@ -311,6 +311,8 @@ pub struct Body {
     pub vars: Vec<Ty>,
     /// Strings by their number; the first is empty.
     pub strings: Vec<String>,
+    /// What variables hold before the first statement, where that is not zero.
+    pub starts: Vec<(VarId, Cells)>,
     /// What to do.
     pub stmts: Vec<Stmt>,
 }

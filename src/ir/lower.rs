@@ -121,6 +121,11 @@ impl<'a> Lower<'a> {
             }
         }
         lower.place_targets(&body.stmts, &mut placed);
+        for (var, cells) in &body.starts {
+            lower.place_var(*var, &mut placed);
+            let n = body.vars[var.index()].cells();
+            lower.image[lower.cell_vars[var.index()] as usize..][..n].copy_from_slice(&cells[..n]);
+        }
         for (i, used) in needs.used.iter().enumerate() {
             if *used {
                 lower.place(ExprId(i as u32), &mut placed);
@@ -291,6 +296,7 @@ impl<'a> Lower<'a> {
                 if op == Op::Select {
                     let jump = self.jump(Instr::JumpIfZero { condition, to: 0 });
                     work.push(Work::Otherwise(id, jump, dst, mark));
+                    work.push(Work::Eval(ids[1], Some(dst)));
                 } else {
                     self.copy(Ty::Int, dst, condition);
                     let jump = if op == Op::And {
@@ -300,8 +306,8 @@ impl<'a> Lower<'a> {
                     };
                     let jump = self.jump(jump);
                     work.push(Work::Join(id, jump, dst, mark));
+                    work.push(Work::Eval(ids[1], None));
                 }
-                work.push(Work::Eval(ids[1], None));
             }
             Work::Otherwise(id, jump, dst, mark) => {
                 let value = self.values.pop().unwrap_or(0);
@@ -312,7 +318,7 @@ impl<'a> Lower<'a> {
                 self.free = mark;
                 work.push(Work::Join(id, to_end, dst, mark));
                 if let ExprKind::Op(_, ids) = expr.kind {
-                    work.push(Work::Eval(ids[2], None));
+                    work.push(Work::Eval(ids[2], Some(dst)));
                 }
             }
             Work::Join(id, jump, dst, mark) => {

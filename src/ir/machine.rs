@@ -43,7 +43,7 @@ impl Program {
                     let [a, b, c] = args.map(|reg| read(cells, reg, 3));
                     write(cells, dst, width as usize, ops::apply(op, n as usize, a, b, c));
                 }
-                Instr::Call { .. } | Instr::Noise { .. } => self.function(*instr, cells),
+                Instr::Call { .. } | Instr::Noise { .. } => self.function(instr, cells),
                 Instr::OptionIndex { options, dst, name } => {
                     let name = strings.get(cells[name as usize]);
                     // A name that is only known now and unknown to the lobe means its first option.
@@ -112,9 +112,10 @@ impl Program {
         }
     }
 
-    /// Calls a function.
-    fn function(&self, instr: Instr, cells: &mut [u32]) {
-        match instr {
+    /// Calls a function. Apart from [`run`](Self::run), whose loop would have no registers left beside it.
+    #[inline(never)]
+    fn function(&self, instr: &Instr, cells: &mut [u32]) {
+        match *instr {
             Instr::Call { function, width, count, dst, args } => {
                 let mut values = [[0; 3]; MAX_ARGS];
                 let pairs = self.args[args as usize..].chunks_exact(2).take(count as usize);
@@ -125,24 +126,44 @@ impl Program {
                 write(cells, dst, width as usize, value);
             }
             Instr::Noise { kind, dimensions, periodic, width, dst, args } => {
-                let n = dimensions as usize;
-                let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
-                let regs = &self.args[args as usize..];
-                for (x, reg) in at.x.iter_mut().zip(&regs[..n]) {
-                    *x = [f32::from_bits(cells[*reg as usize])];
-                }
-                if periodic {
-                    for (period, reg) in at.period.iter_mut().zip(&regs[n..2 * n]) {
-                        *period = [f32::from_bits(cells[*reg as usize])];
+                let (kind, regs) = (kind as usize, &self.args[args as usize..]);
+                if width == 1 && !periodic {
+                    let near = match dimensions {
+                        1 => near_noise::<1>(kind, regs, cells),
+                        2 => near_noise::<2>(kind, regs, cells),
+                        3 => near_noise::<3>(kind, regs, cells),
+                        _ => near_noise::<4>(kind, regs, cells),
+                    };
+                    if let Some(value) = near {
+                        cells[dst as usize] = value.to_bits();
+                        return;
                     }
                 }
+                let n = dimensions as usize;
+                let mut at = noise::At { x: [[0.0]; 4], n, period: [[0.0]; 4] };
+                let periods = if periodic { &mut at.period[..n] } else { &mut [] };
+                for (x, reg) in at.x[..n].iter_mut().chain(periods).zip(regs) {
+                    *x = [f32::from_bits(cells[*reg as usize])];
+                }
                 for channel in 0..u32::from(width) {
-                    cells[(dst + channel) as usize] = noise::noise(kind as usize, &at, channel)[0].to_bits();
+                    cells[(dst + channel) as usize] = noise::noise(kind, &at, channel)[0].to_bits();
                 }
             }
             _ => {}
         }
     }
+}
+
+/// Noise of one number where it is worked out fastest.
+#[inline(always)]
+fn near_noise<const N: usize>(kind: usize, regs: &[u32], cells: &[u32]) -> Option<f32> {
+    let regs = regs.first_chunk::<N>()?;
+    // A loop: `map` is a call.
+    let mut x = [0.0; N];
+    for d in 0..N {
+        x[d] = f32::from_bits(cells[regs[d] as usize]);
+    }
+    noise::is_near(kind, &x).then(|| noise::near(kind, x))
 }
 
 impl Call {

@@ -4,7 +4,7 @@ use super::body::{Body, Cells, ExprKind, VarId};
 use super::check::suggest;
 use super::host::{Answers, Host};
 use super::lower;
-use super::passes::{dead, fold, layers, needs};
+use super::passes::{self, fold, layers, needs};
 use super::program::Program;
 use super::types::Ty;
 use crate::diag::Diagnostic;
@@ -186,7 +186,7 @@ impl CheckedShader {
             return Err(errors);
         }
         let answers = Answers::of(self.host.as_deref());
-        let body = dead::remove(fold::fold(&body, &known, answers));
+        let body = passes::tighten(fold::fold(&body, &known, answers));
         let needs = needs::needs(&body, answers);
         if !needs.errors.is_empty() {
             return Err(needs.errors);
@@ -212,7 +212,7 @@ impl CheckedShader {
     pub fn unspecialised(&self) -> Program {
         let open: Vec<VarId> = self.params.iter().map(|p| p.var).collect();
         let answers = Answers::of(self.host.as_deref());
-        let body = dead::remove(fold::fold_open(&self.body, &open, answers));
+        let body = passes::tighten(fold::fold_open(&self.body, &open, answers));
         let program = lower::lower(&body, &needs::needs(&body, answers), &layers::layers(&body), Vec::new());
         Program { host: self.host.clone(), iterations: self.iterations, kept: None, ..program }
     }

@@ -45,6 +45,9 @@ pub fn noise<const L: usize>(kind: usize, at: &At<L>, channel: u32) -> [f32; L] 
     }
 }
 
+/// The cells around a coordinate, and how far it lies above the lower one.
+type Around<const L: usize> = ([[u32; L]; 2], [f32; L]);
+
 impl<const L: usize> At<L> {
     /// Point by point.
     fn each(&self, f: impl Fn(&At<1>) -> [f32; 1]) -> [f32; L] {
@@ -56,7 +59,7 @@ impl<const L: usize> At<L> {
 
     /// The cells around coordinate `d`, and how far it lies above the lower one.
     #[inline(always)]
-    fn around(&self, d: usize) -> ([[u32; L]; 2], [f32; L]) {
+    fn around(&self, d: usize) -> Around<L> {
         let (mut cells, mut above) = ([[0; L]; 2], [0.0; L]);
         let x = &self.x[d];
         let odd = |l: usize| self.period[d][l] >= 1.0 || x[l].abs() >= 2_147_483_648.0;
@@ -159,6 +162,12 @@ fn signed(x: f32, h: u32) -> f32 {
 fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     let choose = |first: bool, a: f32, b: f32| if first { a } else { b };
     let choice = h & 0xffff;
+    // By a mask: where there is no instruction to select floats, a selection of single ones would be a branch after all,
+    // and one that nothing foretells.
+    let below = |limit: u32, a: f32, b: f32| {
+        let mask = (choice.wrapping_sub(limit) as i32 >> 31) as u32;
+        f32::from_bits(a.to_bits() & mask | b.to_bits() & !mask)
+    };
     match N {
         // Slopes ±1/8 to ±1.
         1 => signed((1 + (h & 7)) as f32 * 0.125 * x, h),
@@ -170,12 +179,12 @@ fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
         }
         // Toward the middles of a cube's edges: all but one coordinate ±1.
         3 => {
-            let (a, b) = (choose(choice < 21_845, y, x), choose(choice < 43_690, z, y));
+            let (a, b) = (below(21_845, y, x), below(43_690, z, y));
             signed(a, h) + signed(b, h << 1)
         }
         _ => {
-            let (a, b) = (choose(choice < 0x4000, y, x), choose(choice < 0x8000, z, y));
-            let c = choose(choice < 0xc000, w, z);
+            let (a, b) = (below(0x4000, y, x), below(0x8000, z, y));
+            let c = below(0xc000, w, z);
             signed(a, h) + signed(b, h << 1) + signed(c, h << 2)
         }
     }
@@ -192,10 +201,16 @@ fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
 }
 
 fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
+    lattice(std::array::from_fn::<_, N, _>(|d| at.around(d)), channel)
+}
+
+/// Gradient noise between lattice points, given the cells around each coordinate and how far it lies above the lower.
+#[inline(always)]
+fn lattice<const N: usize, const L: usize>(around: [Around<L>; N], channel: u32) -> [f32; L] {
     // Along each coordinate: what the two cells add to the hash, the offsets from them, the share of the upper one.
     let (mut shares, mut offsets, mut fade) = ([[[0u32; L]; 2]; N], [[[0.0f32; L]; 2]; 4], [[0.0f32; L]; N]);
     for d in 0..N {
-        let (cells, t) = at.around(d);
+        let (cells, t) = around[d];
         for l in 0..L {
             let t = t[l];
             (shares[d][0][l], shares[d][1][l]) = (share_of(cells[0][l], d), share_of(cells[1][l], d));
@@ -229,6 +244,41 @@ fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; 
     let mut out = values[0];
     out.iter_mut().for_each(|x| *x = (*x / largest).clamp(-1.0, 1.0));
     out
+}
+
+/// Coordinates whose cells [`near`] finds are smaller than this.
+const NEAR: f32 = 4_194_304.0;
+
+/// Whether [`near`] will do for a point.
+#[inline(always)]
+pub fn is_near<const N: usize>(kind: usize, x: &[f32; N]) -> bool {
+    kind < 4 && x.iter().fold(true, |near, x| near & (x.abs() < NEAR))
+}
+
+/// [`noise`] of channel 0 where [`is_near`] says so and nothing repeats. It takes coordinates by value: from memory they would be
+/// read in pairs, and a pair waits until both of its halves, written apart, have got there.
+#[inline(always)]
+pub fn near<const N: usize>(kind: usize, x: [f32; N]) -> f32 {
+    // A loop: `map` is a call.
+    let mut around = [([[0]; 2], [0.0]); N];
+    for d in 0..N {
+        around[d] = around_near(x[d]);
+    }
+    let [value] = lattice(around, 0);
+    if kind < 2 { 0.5 + 0.5 * value } else { value }
+}
+
+/// What [`At::around`] gives, by additions alone.
+#[inline(always)]
+fn around_near(x: f32) -> Around<1> {
+    // In the middle of the floats whose last bit is worth 1: adding it rounds, and the bits of the sum count.
+    const WHOLE: f32 = 12_582_912.0;
+    let sum = x + WHOLE;
+    let rest = x - (sum - WHOLE);
+    // All bits if that rounded up. (-0 is no less than the whole number it rounds to.)
+    let up = ((rest + 0.0).to_bits() as i32 >> 31) as u32;
+    let cell = sum.to_bits().wrapping_sub(WHOLE.to_bits()).wrapping_add(up);
+    ([[cell], [cell.wrapping_add(1)]], [rest - f32::from_bits(up & (-1f32).to_bits())])
 }
 
 fn simplex(at: &At<1>, channel: u32) -> [f32; 1] {
@@ -407,5 +457,36 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn near_points_get_the_same() {
+        fn compare<const N: usize>(found: &mut usize) {
+            for (k, at) in points(N).enumerate() {
+                // Between lattice points, on them, at both zeros, at the ends of what is near, and beyond.
+                let x: [f32; N] = std::array::from_fn(|d| match (k >> (2 * d)) % 8 {
+                    0 => at.x[d][0].round(),
+                    1 => -0.0,
+                    2 => at.x[d][0] * 1e-9,
+                    3 => at.x[d][0] * 1e5,
+                    4 => NEAR.next_down() * at.x[d][0].signum(),
+                    5 if d == 0 => [NEAR, f32::NAN, f32::NEG_INFINITY][k % 3],
+                    _ => at.x[d][0],
+                });
+                let at = At { x: std::array::from_fn(|d| [*x.get(d).unwrap_or(&0.0)]), ..at };
+                assert_eq!(is_near(0, &x), x.iter().all(|x| x.abs() < NEAR), "{x:?}");
+                for kind in (0..KINDS.len()).filter(|kind| is_near(*kind, &x)) {
+                    let (one, other) = (near(kind, x), noise(kind, &at, 0));
+                    assert_eq!(one.to_bits(), other.to_bits(), "{} at {x:?}", KINDS[kind]);
+                    *found += 1;
+                }
+            }
+        }
+        let mut found = 0;
+        compare::<1>(&mut found);
+        compare::<2>(&mut found);
+        compare::<3>(&mut found);
+        compare::<4>(&mut found);
+        assert!(found > 500_000, "{found}");
     }
 }
