@@ -121,6 +121,33 @@ fn a_colored_boundary_divides_all_light() {
     println!("colored boundaries scatter {:.5} to {:.6}", worst.0, worst.1);
 }
 
+/// What bounces between facets is given back as the channel that loses least has it.
+#[test]
+fn a_film_on_glass_divides_nearly_all_light() {
+    let mut worst = (1.0f64, 1.0f64);
+    for (alpha, thickness, film, distribution) in
+        [(1e-4, 120.0, 2.2, 0.0), (0.1, 500.0, 1.33, 1.0), (0.4, 1800.0, 1.8, 0.0)]
+    {
+        let set = [
+            ("roughness_x", alpha),
+            ("roughness_y", alpha),
+            ("thinfilm_thickness", thickness),
+            ("thinfilm_ior", film),
+            ("distribution", distribution),
+        ];
+        let stack = single::<f64>(LobeKind::Dielectric, &set);
+        for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
+            for side in [Side::View, Side::Light] {
+                let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
+                worst = e.value.iter().fold(worst, |(lo, hi), e| (lo.min(*e), hi.max(*e)));
+                let all = e.max() > 0.999 && e.value.iter().all(|e| (0.997..1.0001).contains(e));
+                assert!(all, "α {alpha} {thickness} nm {side:?} cos {cos}: {e:?}");
+            }
+        }
+    }
+    println!("glass under films scatters {:.5} to {:.6}", worst.0, worst.1);
+}
+
 #[test]
 fn a_colored_boundary_reflects_one_color_and_passes_the_rest() {
     let mut tree = ClosureTree::new();

@@ -9,9 +9,9 @@
 //! wavelengths per channel.
 
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, widths};
+use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, metal_reflectance, widths};
 use super::{Lobe, Rgb};
-use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
+use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::film::Film;
 use crate::optics::{Lift, Real, V3, fresnel};
@@ -59,16 +59,6 @@ pub struct Conductor<S> {
     surface: Reflector<S>,
 }
 
-/// For [`Facet::Mirror`]: the key holds n, then k, then the film.
-fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
-    let [n0, n1, n2, k0, k1, k2, thickness, ior] = *key;
-    metal([n0, n1, n2], [k0, k1, k2], Film { thickness, ior }, thickness > 0.0).at(c, 1.0 - c)
-}
-
-fn metal<S: Real>(n: Rgb<S>, k: Rgb<S>, film: Film<S>, coated: bool) -> Reflectance<S> {
-    if coated { Reflectance::Coated(n, k, film) } else { Reflectance::Conductor(n, k) }
-}
-
 impl<S: Real> Lobe<S> for Conductor<S> {
     type Params = ConductorParams;
 
@@ -86,7 +76,7 @@ impl<S: Real> Lobe<S> for Conductor<S> {
             *key = value.map_or(0.0, |v| spec.clamp(0, v).into());
             known && value.is_some()
         });
-        let facet = Facet::Mirror { reflectance, key, parts: if known { 3 } else { 0 } };
+        let facet = Facet::Mirror { reflectance: metal_reflectance, key, parts: if known { 3 } else { 0 } };
         Some(TableSpec::Facets(FacetSpec { shape, alpha: known_widths(SPEC, 2, 6, values), facet }))
     }
 
@@ -99,7 +89,7 @@ impl<S: Real> Lobe<S> for Conductor<S> {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let [n, k] = [params.ior, params.extinction].map(|v| v.map(S::from_f32));
         let [thickness, ior] = [params.thinfilm_thickness, params.thinfilm_ior].map(S::from_f32);
-        let metal = metal(n, k, Film { thickness, ior }, params.thinfilm_thickness > 0.0);
+        let metal = Reflectance::metal(n, k, Film { thickness, ior }, params.thinfilm_thickness > 0.0);
         let alpha = [params.roughness_x, params.roughness_y];
         Conductor { surface: Reflector::new(shape, alpha, metal, wo, curve.facets()) }
     }

@@ -5,13 +5,17 @@
 //! roughness, if both tints are white ([`super::interface`]; thin walls: [`super::pane`]). As a coat over a closure use it with a black
 //! `transmission_tint`: then only what it reflects is taken from the base.
 //!
+//! A film between the media colors both, reflection by the color that interferes and what passes by the rest
+//! ([`crate::optics::film`]); thin walls have none.
+//!
 //! Where this departs from the source: roughness is used as the width α of the slopes, the geometric mean of both;
-//! no thin film.
+//! the film is summed exactly at three wavelengths per channel. What bounces between facets under a film is given back as the
+//! channel that loses least has it; others may lose 0.3 %.
 
 use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, known_width, known_widths, widths};
+use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_width, known_widths, metal_reflectance, widths};
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -39,6 +43,10 @@ closure! {
         string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
         /// 1: a thin wall, both its surfaces at once: light passes unbent, spread by the roughness as what is reflected.
         @keyword int thin_walled = 0.0, in (0.0, 1.0);
+        /// Thickness of a film between the media, in nanometres; 0: none. Thin walls have none.
+        @keyword float thinfilm_thickness = 0.0, in (0.0, 2000.0);
+        /// Index of refraction of the film over that outside.
+        @keyword float thinfilm_ior = 1.5, in (1.0, 4.0);
     }
     source: "MaterialX, dielectric_bsdf; Walter et al. 2007; Kulla & Conty 2017",
     reciprocal: true,
@@ -82,7 +90,15 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
             let key = [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             (known_widths(SPEC, 4, 12, values), Facet::Mirror { reflectance: pane::parts, key, parts: 2 })
         } else {
-            (known_width(SPEC, 4, 12, values), Facet::Dielectric { eta })
+            // Without a film its index does not matter.
+            let facet = match SPEC.params[9].clamp(0, values[17]?) {
+                thickness if thickness > 0.0 => {
+                    let key = coated_glass([eta; 3], [thickness, SPEC.params[10].clamp(0, values[18]?)]);
+                    Facet::Colored { eta, reflectance: metal_reflectance, key }
+                }
+                _ => Facet::Dielectric { eta },
+            };
+            (known_width(SPEC, 4, 12, values), facet)
         };
         Some(TableSpec::Facets(FacetSpec { shape, alpha, facet }))
     }
@@ -103,7 +119,8 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         if params.thin_walled > 0 {
             Thin(Pane::new(shape, alpha, eta, tints, wo, curve.facets()))
         } else {
-            Solid(Interface::new(shape, alpha, (eta, None), tints, wo, curve.facets()))
+            let film = Reflectance::coated([eta; 3], [params.thinfilm_thickness, params.thinfilm_ior]);
+            Solid(Interface::new(shape, alpha, (eta, film), tints, wo, curve.facets()))
         }
     }
 

@@ -8,7 +8,7 @@
 
 use super::Rgb;
 use super::registry::LobeSpec;
-use crate::albedo::facets::{FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
+use crate::albedo::facets::{FacetKey, FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
@@ -45,6 +45,17 @@ fn known(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> 
     Some([value(0)?, value(1)?])
 }
 
+/// For tables: the key holds n, then k, then the thickness of a film and its index.
+pub(super) fn metal_reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
+    let [n0, n1, n2, k0, k1, k2, thickness, ior] = *key;
+    Reflectance::metal([n0, n1, n2], [k0, k1, k2], Film { thickness, ior }, thickness > 0.0).at(c, 1.0 - c)
+}
+
+/// The key of clear glass with the index `n` per channel under a film.
+pub(super) fn coated_glass(n: [f64; 3], [thickness, ior]: [f32; 2]) -> FacetKey {
+    [n[0], n[1], n[2], 0.0, 0.0, 0.0, f64::from(thickness), f64::from(ior)]
+}
+
 /// Whether `u` in [0, 1) falls below `p`, and `u` stretched back to [0, 1) to be used again.
 pub(super) fn split<S: Real>(u: S, p: S) -> (S::Mask, S) {
     let first = u.lt(p);
@@ -71,6 +82,17 @@ pub(super) enum Reflectance<S> {
 }
 
 impl<S: Real> Reflectance<S> {
+    /// From n and k, under a film if it is `coated`.
+    pub(super) fn metal(n: Rgb<S>, k: Rgb<S>, film: Film<S>, coated: bool) -> Self {
+        if coated { Reflectance::Coated(n, k, film) } else { Reflectance::Conductor(n, k) }
+    }
+
+    /// Of clear glass with the index `n` per channel under a film, if there is one.
+    pub(super) fn coated(n: [f64; 3], [thickness, ior]: [f32; 2]) -> Option<Self> {
+        let film = Film { thickness: S::from_f32(thickness), ior: S::from_f32(ior) };
+        (thickness > 0.0).then(|| Reflectance::Coated(n.map(S::c), [S::zero(); 3], film))
+    }
+
     /// At the cosine `c` between direction and facet; `fall` is 1 − c with all its digits.
     #[inline(always)]
     pub(super) fn at<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
@@ -90,10 +112,18 @@ impl<S: Real> Reflectance<S> {
         }
     }
 
-    /// 1 − F, with all its digits where F is close to 1.
+    /// 1 − F of what transmits, with all its digits where F is close to 1.
     #[inline(always)]
     pub(super) fn rest<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
-        let Reflectance::Schlick(f0, f90, exponent) = self else { return self.at(c, fall).map(|f| L::one() - f) };
+        let (f0, f90, exponent) = match self {
+            Reflectance::Schlick(f0, f90, exponent) => (f0, f90, exponent),
+            // Of glass; a metal's rest goes nowhere.
+            Reflectance::Coated(n, _, film) => {
+                let film = Film { thickness: L::lift(film.thickness), ior: L::lift(film.ior) };
+                return std::array::from_fn(|i| film::passed(film, L::lift(n[i]), c, i));
+            }
+            _ => return self.at(c, fall).map(|f| L::one() - f),
+        };
         let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
         std::array::from_fn(|i| {
             let (f0, f90) = (L::lift(f0[i]), L::lift(f90[i]));

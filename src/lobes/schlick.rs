@@ -6,13 +6,17 @@
 //! With a transmission tint what is not reflected is refracted, 1 − F per channel, and the lobe lies between two media
 //! ([`super::interface`]): F is then taken at the cosine outside, from either side, and what is totally reflected stays so.
 //!
-//! Where this departs from the source: roughness is used as the width α of the slopes; no thin film. What bounces between
-//! facets is divided between reflection and refraction as for clear glass, whatever the colors.
+//! A film over it ([`crate::optics::film`]) lies on clear media that reflect f0 facing; f90 and the exponent are then not
+//! used.
+//!
+//! Where this departs from the source: roughness is used as the width α of the slopes. What bounces between facets is divided between reflection and refraction as for clear glass, whatever the colors.
 
 use super::interface::{Interface, index};
 use super::limits::{Limits, SlotRange};
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
+use super::rough::{
+    DISTRIBUTIONS, Reflectance, Reflector, coated_glass, known_width, known_widths, metal_reflectance, widths,
+};
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -43,6 +47,10 @@ closure! {
         float exponent = 5.0, in (0.5, 20.0);
         /// Distribution of the slopes; "default" and "multi_ggx" are "ggx".
         string distribution = 0.0, in (0.0, 3.0), of ["ggx", "beckmann", "default", "multi_ggx"];
+        /// Thickness of a film on it, in nanometres; 0: none.
+        @keyword float thinfilm_thickness = 0.0, in (0.0, 2000.0);
+        /// Index of refraction of the film.
+        @keyword float thinfilm_ior = 1.5, in (1.0, 4.0);
     }
     source: "MaterialX, generalized_schlick_bsdf; Schlick 1994; Kulla & Conty 2017",
     reciprocal: true,
@@ -63,14 +71,19 @@ pub enum GeneralizedSchlick<S> {
 use GeneralizedSchlick::{Coat, Glass};
 
 /// For tables: the key holds F0, F90 and the exponent.
-fn reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
+fn schlick_reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
     Reflectance::Schlick([key[0], key[1], key[2]], [key[3], key[4], key[5]], key[6]).at(c, 1.0 - c)
 }
 
-/// The index of a dielectric that reflects the mean of `f0` facing, as [`index`] keeps it.
+/// The index of a dielectric that reflects `f0` facing.
+fn clear(f0: f64) -> f64 {
+    let root = f0.clamp(0.0, 0.99).sqrt();
+    (1.0 + root) / (1.0 - root)
+}
+
+/// That of the mean of `f0`, as [`index`] keeps it.
 fn index_of(f0: [f32; 3]) -> f64 {
-    let root = (f0.iter().map(|f| f64::from(*f)).sum::<f64>() / 3.0).clamp(0.0, 0.99).sqrt();
-    index(((1.0 + root) / (1.0 - root)) as f32)
+    index(clear(f0.iter().map(|f| f64::from(*f)).sum::<f64>() / 3.0) as f32)
 }
 
 fn known<const N: usize>(values: &[Option<f32>], at: usize, param: usize) -> Option<[f32; N]> {
@@ -79,6 +92,20 @@ fn known<const N: usize>(values: &[Option<f32>], at: usize, param: usize) -> Opt
         *color = SPEC.params[param].clamp(c, values[at + c]?);
     }
     Some(color)
+}
+
+/// f0, and the reflectance with its key, if they are known.
+fn law(values: &[Option<f32>]) -> Option<([f32; 3], fn(&FacetKey, f64) -> [f64; 3], FacetKey)> {
+    let f0 = known::<3>(values, 14, 6)?;
+    let [thickness] = known(values, 22, 10)?;
+    if thickness > 0.0 {
+        let [ior] = known(values, 23, 11)?;
+        return Some((f0, metal_reflectance, coated_glass(f0.map(|f| clear(f.into())), [thickness, ior])));
+    }
+    let (f90, [exponent]) = (known::<3>(values, 17, 7)?, known(values, 20, 8)?);
+    let mut key = [0.0; 8];
+    key.iter_mut().zip(f0.into_iter().chain(f90).chain([exponent])).for_each(|(key, v)| *key = f64::from(v));
+    Some((f0, schlick_reflectance, key))
 }
 
 fn transmits(tint: [f32; 3]) -> bool {
@@ -106,18 +133,12 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
         let shape = DISTRIBUTIONS[SPEC.params[9].clamp(0, values[21]?) as usize];
         // Whether light passes decides what the table is of.
         let transmits = transmits(known(values, 9, 3)?);
-        let curve =
-            (|| Some((known::<3>(values, 14, 6)?, known::<3>(values, 17, 7)?, known::<1>(values, 20, 8)?[0])))();
-        let mut key = [0.0; 8];
-        if let Some((f0, f90, exponent)) = curve {
-            for (key, v) in key.iter_mut().zip(f0.into_iter().chain(f90).chain([exponent])) {
-                *key = f64::from(v);
-            }
-        }
+        let law = law(values);
+        let (reflectance, key) = law.map_or((schlick_reflectance as fn(&_, _) -> _, [0.0; 8]), |law| (law.1, law.2));
         let (alpha, facet) = if transmits {
-            (known_width(SPEC, 4, 12, values), Facet::Colored { eta: index_of(curve?.0), reflectance, key })
+            (known_width(SPEC, 4, 12, values), Facet::Colored { eta: index_of(law?.0), reflectance, key })
         } else {
-            let parts = if curve.is_some() { 3 } else { 0 };
+            let parts = if law.is_some() { 3 } else { 0 };
             (known_widths(SPEC, 4, 12, values), Facet::Mirror { reflectance, key, parts })
         };
         Some(TableSpec::Facets(FacetSpec { shape, alpha, facet }))
@@ -145,7 +166,12 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     fn new(params: &GeneralizedSchlickParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let [f0, f90] = [params.f0, params.f90].map(|f| f.map(S::from_f32));
-        let curved = Reflectance::Schlick(f0, f90, S::from_f32(params.exponent));
+        let film = [params.thinfilm_thickness, params.thinfilm_ior];
+        let curved = Reflectance::coated(params.f0.map(|f| clear(f.into())), film).unwrap_or(Reflectance::Schlick(
+            f0,
+            f90,
+            S::from_f32(params.exponent),
+        ));
         let alpha = [params.roughness_x, params.roughness_y];
         if transmits(params.transmission_tint) {
             let tints = [params.reflection_tint, params.transmission_tint];

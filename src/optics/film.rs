@@ -1,4 +1,4 @@
-//! A thin film on a metal: the exact sum of all reflections between its two faces (Airy 1833), unpolarised.
+//! A thin film on a metal or on glass: the exact sum of all reflections between its two faces (Airy 1833), unpolarised.
 //!
 //! With r₁₂, r₂₃ the amplitudes at either face and β = 2π·n₂·d·cos θ₂/λ, R = |r₁₂ + r₂₃·e^{2iβ}|²/|1 + r₁₂·r₂₃·e^{2iβ}|². Each
 //! channel is the mean over three wavelengths about its own, which lets the fringes of thick films fade as they do for a broad
@@ -68,8 +68,7 @@ pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
     let path = L::c(2.0) * n2 * film.thickness * c2;
     let mut sum = L::zero();
     for (ratio, weight) in BAND {
-        let turns = path * L::c(1.0 / (ratio * WAVELENGTHS[channel]));
-        let (sin, cos) = ((turns - turns.floor()) * L::c(TAU)).sin_cos();
+        let (sin, cos) = turn(path, ratio, channel);
         for (outer, inner) in outer.into_iter().zip([inner_s, inner_p]) {
             let back = inner.times(Complex(cos, sin));
             let under = Complex(back.0 * outer, back.1 * outer).plus(L::one());
@@ -77,6 +76,40 @@ pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
         }
     }
     sum.clamp(L::zero(), L::one())
+}
+
+/// What passes into glass of index n under a film, 1 − R: the product of what passes its two faces over the same sum, so
+/// that it keeps its digits where nearly all is reflected. 0 where all is.
+#[inline(always)]
+pub fn passed<L: Real>(film: Film<L>, n: L, c: L, channel: usize) -> L {
+    let one = L::one();
+    let c = c.clamp(L::c(1e-6), one);
+    let n2 = film.ior.max(one);
+    let c2 = c.mul_add(c, (n2 - one) * (n2 + one)).safe_sqrt() / n2;
+    // n·cos θ₃; none where the light is totally reflected.
+    let q = c.mul_add(c, (n - one) * (n + one)).safe_sqrt();
+    // The admittances at both faces, for either polarisation: r₁₂ = (x − y)/(x + y), r₂₃ = (u − v)/(u + v).
+    let a = n2 * c2;
+    let faces = [(c, a, a, q), (c2, n2 * c, n2 * q, n * n * c2)];
+    let path = L::c(2.0) * a * film.thickness;
+    let mut sum = L::zero();
+    for (ratio, weight) in BAND {
+        let cos = turn(path, ratio, channel).1;
+        for (x, y, u, v) in faces {
+            let (straight, back) = ((x + y) * (u + v), (x - y) * (u - v));
+            let all = straight.mul_add(straight, back * back) + L::c(2.0) * straight * back * cos;
+            sum = (x * y * u * v / all.max(L::c(1e-30))).mul_add(L::c(8.0 * weight), sum);
+        }
+    }
+    sum.clamp(L::zero(), one)
+}
+
+/// Sine and cosine of the phase that one way to the far face and back adds, for the wavelength at `ratio` of a channel's own;
+/// `path` is its optical length in nanometres.
+#[inline(always)]
+fn turn<L: Real>(path: L, ratio: f64, channel: usize) -> (L, L) {
+    let turns = path * L::c(1.0 / (ratio * WAVELENGTHS[channel]));
+    ((turns - turns.floor()) * L::c(TAU)).sin_cos()
 }
 
 #[cfg(test)]
@@ -105,6 +138,22 @@ mod tests {
         let film = Film { thickness: 532.0 / (4.0 * 1.5), ior: 1.5f64 };
         let (quenched, bare) = (metal(film, 2.25, 0.0, 1.0, 1), fresnel::conductor(2.25, 0.0, 1.0));
         assert!(quenched < 0.005 && bare > 0.14, "{quenched} {bare}");
+    }
+
+    #[test]
+    fn what_glass_does_not_reflect_passes() {
+        for i in 0..4000u32 {
+            let t = |m: u32| f64::from(i * m % 997) / 997.0;
+            let film = Film { thickness: 2000.0 * t(13), ior: 1.0 + 2.0 * t(29) };
+            let (n, c) = (0.3 + 3.0 * t(37), t(53).powi(3));
+            let (back, on) = (metal(film, n, 0.0, c, 1), passed(film, n, c, 1));
+            assert!((back + on - 1.0).abs() < 1e-9, "{film:?} {n} {c}: {back} and {on}");
+            let narrow = Film { thickness: film.thickness as f32, ior: film.ior as f32 };
+            let seen = f64::from(passed(narrow, n as f32, c as f32, 1));
+            // Next to the critical angle what passes has a root's slope, and thick films turn fast with the angle.
+            let edge = (c * c + (n - 1.0) * (n + 1.0)).abs() < 1e-3;
+            assert!(edge || (seen - on).abs() < 2e-3 * on + 1e-6, "{film:?} {n} {c}: {seen} for {on}");
+        }
     }
 
     #[test]

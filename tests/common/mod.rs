@@ -167,6 +167,7 @@ fn surfaces(kind: LobeKind) -> Vec<Vec<f32>> {
         block(kind, |p| {
             let t = [0.0, 1.0, 0.4, 0.1][k / 2 % 4];
             match p.ty {
+                ParamTy::Float if p.name == "thinfilm_thickness" => Some([0.0, 300.0, 0.0, 900.0][k / 2 % 4]),
                 ParamTy::Float if is_width(p) => Some(if p.name.contains('x') { x } else { y }),
                 ParamTy::Float => Some(p.min.max(0.0) + (p.max.min(10.0) - p.min.max(0.0)) * t),
                 ParamTy::String => Some((k % 2) as f32),

@@ -10,9 +10,6 @@ use crate::lobes::registry::{Build, Form, ParamSpec, ParamTy, SlotSource};
 use crate::span::Span;
 use crate::syntax::ast;
 
-/// MaterialX's keywords for a film on a surface.
-const FILM: [&str; 2] = ["thinfilm_thickness", "thinfilm_ior"];
-
 impl Checker<'_> {
     pub(super) fn closure(&mut self, form: &Form, given: &Given, span: Span) -> Typed {
         let positional = form.positional().count();
@@ -81,14 +78,6 @@ impl Checker<'_> {
             if name == "label" && given.typed.get(at + 1).is_some_and(|value| value.ty == Ty::String) {
                 let d = Diagnostic::warning("W0508", at_key, "the label has no effect");
                 self.diagnostics.push(d.help("lobes are told apart by where they stand; to name a value use `debug`"));
-                at += 2;
-                continue;
-            }
-            let number = given.typed.get(at + 1).is_some_and(|value| value.ty.distance(Ty::Float).is_some());
-            if FILM.contains(&name) && number && form.name.ends_with("_bsdf") && form.keywords().all(|p| p.name != name)
-            {
-                let d = Diagnostic::warning("W0508", at_key, format!("`{name}` has no effect in `{}`", form.name));
-                self.diagnostics.push(d.help("films are modelled on metals only: `conductor_bsdf`, `metal`"));
                 at += 2;
                 continue;
             }
