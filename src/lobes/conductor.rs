@@ -1,7 +1,7 @@
 //! MaterialX's conductor: metals, from n and k.
 //!
 //! Smooth a colored mirror that whitens at the very edge; at 0.3 brushed; at 0.8 cast metal, its color deeper than the
-//! mirror's, because light that meets several facets is colored by each ([`super::rough`]).
+//! mirror's, because light that meets several facets is colored by each (`lobes::rough`).
 //!
 //! A film on it shifts the color with the angle, as heat does on steel ([`crate::optics::film`]).
 //!

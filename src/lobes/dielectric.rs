@@ -2,7 +2,7 @@
 //!
 //! Smooth (0.001) a window; at 0.1 frosted with a clear core; at 0.5 milky, edges bright; at 1 a diffuser that sends
 //! nearly as much back as through. Reflected and refracted light sum to what arrives, from both media and at every
-//! roughness, if both tints are white ([`super::interface`]; thin walls: [`super::pane`]). As a coat over a closure use it with a black
+//! roughness, if both tints are white (`lobes::interface`; thin walls: `lobes::pane`). As a coat over a closure use it with a black
 //! `transmission_tint`: then only what it reflects is taken from the base.
 //!
 //! A film between the media colors both, reflection by the color that interferes and what passes by the rest

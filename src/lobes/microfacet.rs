@@ -4,7 +4,7 @@
 //! At α = 1e-4 a mirror; at 0.05–0.2 polished to satin; at 0.5 a broad sheen that follows the light; at 1 almost matt,
 //! brightest toward the light's mirror side. With αx ≠ αy the highlight is drawn out across the finer direction, as on
 //! brushed metal. White in, white out: what the facets do not return at the first bounce returns as a reciprocal,
-//! nearly even lobe ([`super::rough`]; [`super::interface`] with an index), so that a white surface reflects all light
+//! nearly even lobe (`lobes::rough`; `lobes::interface` with an index), so that a white surface reflects all light
 //! at every roughness.
 //!
 //! Where this departs from the source: the specification has single bounces only and leaves the rest dark; an index of 0

@@ -5,7 +5,7 @@
 //! light that passes goes where the mirrored direction, taken through the surface, points. So
 //!
 //! f = R′(c)·D(h)·G₂/(4·μo·μi) for ωi on ωo's side, and the same with 1 − R′(c) for ωi folded over from the other, h from the
-//! folded directions: together the white surface of [`super::rough`], whose second bounces are split likewise. Reflection
+//! folded directions: together the white surface of `lobes::rough`, whose second bounces are split likewise. Reflection
 //! and transmission sum to E + M from either side, and both sides look the same.
 
 use super::rough::{largest, split, widths};

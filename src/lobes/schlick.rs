@@ -1,10 +1,10 @@
 //! MaterialX's generalized Schlick: a reflection whose color at both ends is free.
 //!
 //! F = F0 + (F90 − F0)·(1 − c)^exponent. With F0 = 0.04 a varnish, with a saturated F0 a metal; F90 tints the rim. What
-//! bounces between the facets is included ([`super::rough`]).
+//! bounces between the facets is included (`lobes::rough`).
 //!
 //! With a transmission tint what is not reflected is refracted, 1 − F per channel, and the lobe lies between two media
-//! ([`super::interface`]): F is then taken at the cosine outside, from either side, and what is totally reflected stays so.
+//! (`lobes::interface`): F is then taken at the cosine outside, from either side, and what is totally reflected stays so.
 //!
 //! A film over it ([`crate::optics::film`]) lies on clear media that reflect f0 facing; f90 and the exponent are then not
 //! used.
