@@ -123,7 +123,7 @@ fn a_white_sphere_vanishes_in_the_furnace() {
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    for scene in [Scene::Sphere, Scene::Drape] {
+    for scene in [Scene::Sphere, Scene::Ball, Scene::Drape] {
         let one = shown(&WHITE, &RenderSettings { threads: 1, ..settings(scene, 20, 4) });
         let two = shown(&WHITE, &RenderSettings { threads: 2, ..settings(scene, 20, 4) });
         assert_eq!(one.image.data(), two.image.data());

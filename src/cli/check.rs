@@ -81,7 +81,7 @@ pub fn run(global: &Global, args: &CheckArgs) -> Outcome {
 }
 
 /// Files as given, folders by name.
-fn collect(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
+pub(super) fn collect(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
     if path == Path::new("-") || !path.is_dir() {
         files.push(path.to_owned());
         return Ok(());

@@ -8,6 +8,7 @@ mod cost;
 mod eval;
 mod explain;
 mod furnace;
+mod gallery;
 mod host;
 mod input;
 mod lobes;
@@ -142,6 +143,8 @@ enum Command {
     Furnace(furnace::FurnaceArgs),
     /// Draw how the material scatters, where its energy goes, and how noisily it is sampled, as an SVG.
     Plot(plot::PlotArgs),
+    /// Show every script of a folder on every scene, as one page.
+    Gallery(gallery::GalleryArgs),
     /// Does the material scatter alike when light and viewer change places?
     Reciprocity(reciprocity::ReciprocityArgs),
     /// List the closures a script can call.
@@ -202,6 +205,7 @@ pub fn main() -> ExitCode {
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Explain { code } => explain::run(&cli.global, code.as_deref()),
         Command::Furnace(args) => furnace::run(&cli.global, args),
+        Command::Gallery(args) => gallery::run(&cli.global, args),
         Command::Plot(args) => plot::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { header: true, .. } => lobes::header(),

@@ -8,6 +8,7 @@
 //! The world is y-up, in arbitrary units in which the sphere's radius is one. The same settings give the same picture,
 //! bit for bit, whatever the number of threads.
 
+mod ball;
 mod camera;
 mod drape;
 mod environment;
@@ -26,6 +27,7 @@ mod studio;
 mod surface;
 mod tone;
 
+pub use ball::ball_mesh;
 pub use drape::drape_mesh;
 pub use environment::Environment;
 pub use image::Image;
@@ -47,6 +49,8 @@ use std::time::Instant;
 pub enum Scene {
     /// A sphere on a neutral floor.
     Sphere,
+    /// A ball with two grooves on a foot.
+    Ball,
     /// A square cloth hanging over a ball, its corners on the floor.
     Drape,
     /// A sphere in uniform white light, without a floor: a lossless white material cannot be seen.

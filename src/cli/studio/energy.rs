@@ -122,10 +122,10 @@ fn scalars<S: Scalar>(w: Vec3) -> [S; 3] {
     w.to_array().map(|x| S::c(f64::from(x)))
 }
 
-/// What `overcoat cost` says.
+/// What `overcoat cost` says; null for a script that does not compile.
 pub fn cost(workshop: &Workshop, body: &Value) -> Result<Value, Refusal> {
     let compiled = workshop.material(&Script::read(body)?);
-    let Ok((shader, material)) = &compiled.outcome else { return Err(Refusal::bad("the script does not compile")) };
+    let Ok((shader, material)) = &compiled.outcome else { return Ok(Value::Null) };
     let failed = |_| Refusal::bad("the material cannot be shaded");
     let mut cost = measure(material).map_err(failed)?;
     cost["unspecialised"] = measure(&shader.unspecialised()).map_err(failed)?;

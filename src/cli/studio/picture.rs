@@ -32,6 +32,7 @@ impl Scenery {
     pub fn read(workshop: &Workshop, body: &Value) -> Result<Scenery, Refusal> {
         let scene = match body["scene"].as_str() {
             None | Some("sphere") => Scene::Sphere,
+            Some("ball") => Scene::Ball,
             Some("drape") => Scene::Drape,
             Some("furnace") => Scene::Furnace,
             Some(other) => return Err(Refusal::bad(format!("there is no scene `{other}`"))),

@@ -54,9 +54,10 @@ impl Place {
 /// Lobes whose curves are told apart.
 const MAX_LOBES: usize = 12;
 
+/// Null for a script that does not compile.
 pub fn polar(workshop: &Workshop, body: &Value) -> Result<Value, Refusal> {
     let compiled = workshop.material(&Script::read(body)?);
-    let Some(material) = compiled.material() else { return Err(Refusal::bad("the script does not compile")) };
+    let Some(material) = compiled.material() else { return Ok(Value::Null) };
     let place = Place::read(workshop, body)?;
     let bsdf = material.shade(&place.globals, place.wo).map_err(|e| Refusal::bad(e.to_string()))?;
     Ok(describe(material, &place, &bsdf))

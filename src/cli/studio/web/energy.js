@@ -90,6 +90,7 @@ export function shares(root, message) {
 }
 
 export function cost(root, data) {
+  if (!data) return root.replaceChildren();
   const cell = (ns) => (ns >= 100 ? ns.toFixed(0) : ns.toFixed(1));
   const row = (name, key) => element("tr", {}, element("th", { textContent: name, scope: "row" }), element("td", { textContent: cell(data.ns[key]) }), element("td", { textContent: cell(data.unspecialised.ns[key]) }));
   const head = element("tr", {}, element("th", { textContent: "ns" }), element("th", { textContent: "as set", scope: "col" }), element("th", { textContent: "open", scope: "col", title: "with every parameter read at every point" }));

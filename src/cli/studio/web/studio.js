@@ -82,9 +82,9 @@ async function polar() {
     const at = pointed ?? viewer.at;
     const data = await json("/api/lobe", { ...script(), ...where(), at }, lobe.signal);
     plots.polar($("polar"), data, energy.colour);
-    $("place").textContent = `${data.pointed ? "" : "default point, "}${data.theta.toFixed(0)}°${data.backfacing ? ", back" : ""}`;
+    if (data) $("place").textContent = `${data.pointed ? "" : "default point, "}${data.theta.toFixed(0)}°${data.backfacing ? ", back" : ""}`;
   } catch (error) {
-    if (error.name !== "AbortError" && error.status !== 400) say(error.message);
+    if (error.name !== "AbortError") say(error.message);
   }
 }
 let polarTimer = 0;
@@ -98,8 +98,8 @@ function polarSoon() {
 async function measure() {
   try {
     energy.cost($("cost"), await json("/api/cost", script()));
-  } catch {
-    $("cost").replaceChildren();
+  } catch (error) {
+    say(error.message);
   }
 }
 
@@ -309,7 +309,7 @@ function controls() {
   options("tier-b", tiers, "tierB");
   options("layering-b", rules, "layeringB");
   options("light", ["studio", "lamp", "overcast"], "light");
-  const scenes = ["sphere", "drape", "furnace"].map((scene) => {
+  const scenes = ["sphere", "ball", "drape", "furnace"].map((scene) => {
     const button = Object.assign(document.createElement("button"), { textContent: scene });
     button.setAttribute("role", "radio");
     button.dataset.scene = scene;
