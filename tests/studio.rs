@@ -306,6 +306,11 @@ fn a_picture_refines_and_tells_of_the_script() {
     let (_, bytes) = frames.last().expect("frames");
     let middle = &bytes[4 * (100 * 240 + 120)..][..4];
     assert!(middle[2] > middle[0] + 30, "{middle:?}");
+    let alone = studio.post("/api/compile", &body).json();
+    assert_eq!(
+        (&alone["ok"], &alone["shader"], &alone["parameters"]),
+        (&json!(true), &json!("velvet"), &compiled["parameters"])
+    );
     let wrong = studio.render("Ci = difuse(N);\n");
     assert_eq!((wrong.len(), &wrong[0].0["ok"]), (1, &json!(false)));
     let message = &wrong[0].0["diagnostics"][0];

@@ -149,13 +149,16 @@ fn furnace<S: Evaluate>(material: &Material, phi: f64) -> Series {
     let globals = Globals::default();
     let subject = |wo: [S; 3]| S::shade(material, &globals, wo).unwrap_or_else(|_| Bsdf::black());
     let curve = |side: Side| -> Vec<(f64, f64)> {
-        let at = |k: usize| {
-            // Off the horizon, where half the material is another one.
-            let theta = (k * STEP) as f64 + if k * STEP == 90 { 0.5 } else { 0.0 };
+        let at = |theta: f64| {
             let w = direction(theta, phi).to_array().map(|x| S::c(f64::from(x)));
             (theta, albedo(&subject, side, w, TOLERANCE).max())
         };
-        (0..=180 / STEP).into_par_iter().map(at).collect()
+        // Close to the horizon on both sides, where much changes; on it half the material is another one.
+        let above = (0..90 / STEP).map(|k| (k * STEP) as f64).chain([88.5, 89.5, 89.9]);
+        let angles: Vec<f64> = above.clone().chain(above.map(|theta| 180.0 - theta)).collect();
+        let mut curve: Vec<(f64, f64)> = angles.into_par_iter().map(at).collect();
+        curve.sort_by(|a, b| a.0.total_cmp(&b.0));
+        curve
     };
     vec![
         ("held at the viewer".into(), curve(Side::View)),

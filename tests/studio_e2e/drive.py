@@ -162,13 +162,14 @@ def drive(page, folder):
 
 
 def screenshot(page, path):
-    page.until("a picture", lambda: page.run("document.getElementById('progress').textContent").startswith("128/"))
+    page.until("a picture", lambda: page.run("document.getElementById('progress').textContent").startswith("256/"))
     page.until("the curves", lambda: page.run("document.querySelectorAll('#albedo .curve').length") > 1)
     page.until("the cost", lambda: page.run("document.querySelectorAll('#cost td').length") > 4)
     box = page.run("(() => { const b = document.getElementById('viewer').getBoundingClientRect(); return [b.x + b.width * 0.62, b.y + b.height * 0.36]; })()")
     ActionChains(page.driver).move_by_offset(*(int(x) for x in box)).click().perform()
     page.until("the pinned point", lambda: page.run("document.getElementById('energy-at').textContent").startswith("at the pin"))
-    page.run("document.getElementById('source').setSelectionRange(0, 0)")
+    # The signature of the call that the caret is in.
+    page.run("(() => { const s = document.getElementById('source'); const at = s.value.indexOf('sheen(Ci') + 14; s.focus(); s.setSelectionRange(at, at); })()")
     time.sleep(1)
     page.driver.save_screenshot(str(path))
 

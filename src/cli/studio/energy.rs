@@ -126,6 +126,7 @@ fn scalars<S: Scalar>(w: Vec3) -> [S; 3] {
 pub fn cost(workshop: &Workshop, body: &Value) -> Result<Value, Refusal> {
     let compiled = workshop.material(&Script::read(body)?);
     let Ok((shader, material)) = &compiled.outcome else { return Ok(Value::Null) };
+    let _quiet = workshop.hush.ask();
     let failed = |_| Refusal::bad("the material cannot be shaded");
     let mut cost = measure(material).map_err(failed)?;
     cost["unspecialised"] = measure(&shader.unspecialised()).map_err(failed)?;

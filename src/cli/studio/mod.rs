@@ -8,6 +8,7 @@
 mod energy;
 mod guard;
 mod http;
+mod hush;
 mod material;
 mod picture;
 mod polar;
@@ -21,12 +22,14 @@ mod workshop;
 mod tests;
 
 use super::{Failure, Global, Outcome, output};
+use crate::preview::Scene;
 use clap::Args;
 use guard::{Folder, Guard};
 use serde_json::json;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 use workshop::Workshop;
 
 #[derive(Args, Debug)]
@@ -70,6 +73,12 @@ pub fn run(global: &Global, args: &StudioArgs) -> Outcome {
         if !global.quiet {
             eprintln!("warning: edits made elsewhere will not be noticed: {e}");
         }
+    });
+    let early = workshop.clone();
+    // The cloth takes a moment to fall; whoever asks for it later need not wait.
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(3));
+        let _ = early.stage(Scene::Drape, "studio");
     });
     if !args.no_open && open::that_detached(&address).is_err() && !global.quiet {
         eprintln!("open this address in a browser");

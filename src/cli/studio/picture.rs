@@ -4,10 +4,10 @@
 //! ends when all samples are in, or the page asks for another.
 
 use super::http::{Refusal, Stream};
+use super::hush::Resting;
 use super::material::{Compiled, Script};
 use super::server::guarded;
 use super::workshop::Workshop;
-use crate::engine::Material;
 use crate::preview::{Control, Image, Pass, RenderError, Rendered, Scene, Stage, View, display};
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -80,7 +80,8 @@ pub fn show(workshop: &Workshop, wish: &Wish, mut stream: Stream) {
             return;
         }
         let Some(material) = compiled.material() else { return };
-        if let Err(Stopped::Failed(message)) = refine(material, wish, stream) {
+        let material = Resting { material, hush: &workshop.hush };
+        if let Err(Stopped::Failed(message)) = refine(&material, wish, stream) {
             let _ = stream.send(&json!({ "kind": "failed", "message": message }), &[]);
         }
     });
@@ -93,7 +94,7 @@ enum Stopped {
     Failed(String),
 }
 
-fn refine(material: &Material, wish: &Wish, stream: &mut Stream) -> Result<(), Stopped> {
+fn refine(material: &Resting<'_>, wish: &Wish, stream: &mut Stream) -> Result<(), Stopped> {
     let whole = &wish.scenery.pass;
     let pixels = f64::from(whole.width) * f64::from(whole.height);
     let shrink = (pixels / FIRST_PIXELS).sqrt();
@@ -121,7 +122,7 @@ fn refine(material: &Material, wish: &Wish, stream: &mut Stream) -> Result<(), S
     Ok(())
 }
 
-fn expose(material: &Material, wish: &Wish, pass: &Pass) -> Result<Rendered, Stopped> {
+fn expose(material: &Resting<'_>, wish: &Wish, pass: &Pass) -> Result<Rendered, Stopped> {
     let control = Control { progress: &|_, _| {}, cancel: &wish.stop };
     wish.scenery.stage.pass(material, pass, control).map_err(|e| match e {
         RenderError::Cancelled => Stopped::Unwanted,

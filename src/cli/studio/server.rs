@@ -4,6 +4,7 @@
 
 use super::guard::Guard;
 use super::http::{self, Head, Refusal, Stream};
+use super::material::Script;
 use super::workshop::Workshop;
 use super::{energy, picture, polar, watch, words};
 use serde_json::{Value, json};
@@ -105,6 +106,7 @@ fn answer(connection: TcpStream, question: &Question, workshop: &Workshop) {
         ("GET", "/api/files") => whole(connection, Ok(workshop.files())),
         ("GET", "/api/file") => whole(connection, workshop.open(&head.asked("path").unwrap_or_default())),
         ("GET", "/api/changes") => Stream::open(connection).map(|stream| watch::tell(workshop, stream)),
+        ("POST", "/api/compile") => whole(connection, Script::read(body).map(|s| workshop.material(&s).told())),
         ("POST", "/api/save") => whole(connection, workshop.save(body)),
         ("POST", "/api/lobe") => whole(connection, polar::polar(workshop, body)),
         ("POST", "/api/cost") => whole(connection, energy::cost(workshop, body)),

@@ -4,6 +4,7 @@ use super::super::Global;
 use super::super::host::CliHost;
 use super::guard::Folder;
 use super::http::Refusal;
+use super::hush::Hush;
 use super::material::{Compiled, Script};
 use crate::engine::Engine;
 use crate::globals::Globals;
@@ -39,6 +40,7 @@ pub struct Workshop {
     hosts: Mutex<HashMap<PathBuf, (u64, Arc<CliHost>)>>,
     stages: Mutex<VecDeque<(StageKey, Arc<Stage>)>>,
     slots: Mutex<HashMap<String, Arc<AtomicBool>>>,
+    pub hush: Hush,
 }
 
 type Key = (u64, Script);
@@ -64,6 +66,7 @@ impl Workshop {
             hosts: Mutex::default(),
             stages: Mutex::default(),
             slots: Mutex::default(),
+            hush: Hush::default(),
         }
     }
 
@@ -99,6 +102,7 @@ impl Workshop {
                 return material;
             }
         }
+        let _quiet = self.hush.ask();
         let made = Arc::new(Compiled::new(&self.engine_for(script), script));
         let mut kept = lock(&self.kept);
         kept.push_front((key, made.clone()));

@@ -125,5 +125,5 @@ function filter(words, typed) {
     return label.startsWith(wanted) ? 0 : wanted.length > 1 && label.includes(wanted) ? 1 : 2;
   };
   const fresh = words.filter((w) => !seen.has(w.label) && seen.add(w.label) && rank(w) < 2);
-  return fresh.sort((a, b) => rank(a) - rank(b)).slice(0, 60);
+  return fresh.sort((a, b) => rank(a) - rank(b) || a.label.length - b.label.length).slice(0, 60);
 }

@@ -55,7 +55,7 @@ export class Parameters {
   row(p) {
     const id = `parameter-${p.name}`;
     const value = this.values[p.name] ?? p.default ?? (p.kind === "color" || p.kind === "triple" ? [0, 0, 0] : p.kind === "text" ? "" : 0);
-    const name = element("label", { htmlFor: id, textContent: p.label ?? p.name, title: [p.name, p.help].filter(Boolean).join(": ") });
+    const name = element("label", { htmlFor: id, textContent: p.label ?? p.name, title: [p.label, p.name, p.help].filter(Boolean).join(": ") });
     const control = this[p.kind](p, id, value);
     const row = element("div", { className: `row ${p.kind}` }, name, ...control);
     row.dataset.name = p.name;

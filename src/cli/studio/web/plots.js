@@ -48,7 +48,7 @@ export function albedo(root, data) {
   if (worst[1] > 1.0001) {
     svg.append(node("circle", { class: "worst", cx: x(worst[0]), cy: y(worst[1]), r: 3.5 }));
     const end = worst[0] > 45;
-    svg.append(node("text", { class: "label worst", x: x(worst[0]) + (end ? -7 : 7), y: Math.max(y(worst[1]) + 3, 16), "text-anchor": end ? "end" : "start" }, worst[1].toFixed(3)));
+    svg.append(node("text", { class: "label worst", x: x(worst[0]) + (end ? -7 : 7), y: y(worst[1]) + 14, "text-anchor": end ? "end" : "start" }, worst[1].toFixed(3)));
   }
   root.replaceChildren(svg);
 }

@@ -28,9 +28,9 @@ let compiled = { ok: true, diagnostics: [] };
 let report = null;
 let curves = null;
 
-/** The script with what it is set to; for B what was held, if anything was. */
+/** The script, as it last compiled, with what it is set to; for B what was held, if anything was. */
 function script(slot = "a") {
-  const own = { file: current.path ?? "untitled.osl", text: current.text, set: current.values };
+  const own = { file: current.path ?? "untitled.osl", text: current.good ?? current.text, set: current.values };
   if (slot === "a") return { ...own, tier: choices.tier, layering: choices.layering };
   return { ...(held ?? own), tier: choices.tierB, layering: choices.layeringB };
 }
@@ -81,8 +81,9 @@ async function polar() {
   try {
     const at = pointed ?? viewer.at;
     const data = await json("/api/lobe", { ...script(), ...where(), at }, lobe.signal);
+    if (!data) return;
     plots.polar($("polar"), data, energy.colour);
-    if (data) $("place").textContent = `${data.pointed ? "" : "default point, "}${data.theta.toFixed(0)}°${data.backfacing ? ", back" : ""}`;
+    $("place").textContent = `${data.pointed ? "" : "default point, "}${data.theta.toFixed(0)}°${data.backfacing ? ", back" : ""}`;
   } catch (error) {
     if (error.name !== "AbortError") say(error.message);
   }
@@ -103,29 +104,49 @@ async function measure() {
   }
 }
 
-/** The script or what it is set to has changed. */
+/** What the script is set to, or how it is shown, has changed. */
 function changed() {
+  if (current.good === undefined) return;
   viewer.render();
   accountSoon();
   polarSoon();
 }
 
+let compiling = false;
+let again = false;
+/** The text has changed: the picture goes on as it is until the text compiles. */
+async function compile() {
+  again = compiling;
+  if (compiling) return;
+  compiling = true;
+  const [d, text] = [current, current.text];
+  try {
+    const message = await json("/api/compile", { ...script(), text });
+    if (d === current) onCompiled(message, text);
+  } catch (error) {
+    say(error.message);
+  }
+  compiling = false;
+  if (again) compile();
+}
+
 // What comes back.
 
-function onCompiled(message, slot) {
-  if (slot !== "a") return;
+function onCompiled(message, text) {
   compiled = message;
   if (message.ok) {
     say(null);
     for (const name of message.refused) delete current.values[name];
     parameters.declare(message.parameters, current.values);
     editor.parameters = message.parameters;
-    current.caption = message.shader;
+    current.good = text;
+    changed();
   } else {
     report = null;
+    accounts.stop();
     energy.verdict($("verdict"), { verdict: "error" });
   }
-  $("stale").hidden = message.ok;
+  $("stale").hidden = message.ok || current.good === undefined;
   messages();
 }
 
@@ -186,7 +207,7 @@ function select(d) {
   editor.show(d.text, d.caret ?? 0);
   energy.verdict($("verdict"), null);
   tabs();
-  changed();
+  compile();
 }
 
 function shut(d) {
@@ -252,10 +273,13 @@ async function saveAs() {
 /** Files have changed outside. */
 async function outside(names) {
   await files();
+  // Included files and textures count too; what this page saved itself does not.
+  let matters = names.some((n) => !documents.some((d) => d.path === n));
   for (const d of documents.filter((d) => names.includes(d.path))) {
     try {
       const { text, stamp } = await json(`/api/file?path=${encodeURIComponent(d.path)}`);
       if (stamp === d.stamp) continue;
+      matters = true;
       if (dirty(d)) {
         say(`${d.path} was changed elsewhere; saving will ask before it writes over that.`);
         continue;
@@ -266,8 +290,7 @@ async function outside(names) {
       // It is gone for a moment while another editor replaces it.
     }
   }
-  // Included files and textures count too.
-  changed();
+  if (matters) compile();
   tabs();
 }
 
@@ -424,14 +447,13 @@ async function start() {
     current.text = editor.text;
     current.note = "";
     tabs();
-    changed();
+    compile();
   });
   parameters = new Parameters($("parameters"), changed);
   controls();
   documents.push({ path: null, text: "", kept: "", stamp: null, values: {} });
   current = documents[0];
   viewer = new Viewer($("viewer"), (slot) => ({ ...script(slot), ...scenery() }), {
-    compiled: onCompiled,
     framed: onFramed,
     failed: (error) => say(error.message),
     pointed: (spot) => {

@@ -4,7 +4,7 @@ import { Latest } from "./server.js";
 
 /** Pixels of a side of the picture at most: what two cores refine while one looks. */
 const MOST = 720;
-const SAMPLES = 128;
+const SAMPLES = 256;
 
 class Pane {
   constructor(viewer, canvas, slot) {
@@ -14,10 +14,7 @@ class Pane {
   }
 
   take(message, bytes) {
-    if (message.kind === "compiled") {
-      this.viewer.on.compiled(message, this.slot);
-      return !message.ok;
-    }
+    if (message.kind === "compiled") return !message.ok;
     if (message.kind === "failed") {
       this.viewer.on.failed(new Error(message.message));
       return true;
@@ -29,6 +26,8 @@ class Pane {
     const { width, height } = this.viewer.size;
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
     context.imageSmoothingQuality = "high";
+    // A sample a pixel, drawn large: softly, so that shapes are seen before grain.
+    context.filter = message.samples ? "none" : "blur(2px)";
     context.drawImage(small, 0, 0, width, height);
     this.frames += 1;
     this.canvas.dataset.frames = this.frames;
@@ -38,7 +37,7 @@ class Pane {
 }
 
 export class Viewer {
-  /** `on`: compiled, failed, framed, pointed, pinned. `state()`: the question without view and size, for a slot. */
+  /** `on`: failed, framed, pointed, pinned. `state()`: the question without view and size, for a slot. */
   constructor(root, state, on) {
     Object.assign(this, { root, state, on });
     this.client = crypto.getRandomValues(new Uint32Array(2)).join("-");
