@@ -10,5 +10,5 @@ overcoat=${CARGO_TARGET_DIR:-target}/release/overcoat
 "$overcoat" render examples/satin_lining.osl --scene drape --size 320 --spp 256 -o docs/drape.png
 "$overcoat" render examples/nested_sheens.osl --scene ball --size 320 --spp 256 -o docs/ball.png
 "$overcoat" plot examples/velvet.osl -o docs/plot.svg
-"$overcoat" gallery examples -o docs/gallery --size 128 --spp 256
+"$overcoat" gallery examples -o docs/gallery --size 128 --spp 64
 python3 tests/studio_e2e/drive.py "$overcoat" --screenshot docs/studio.png

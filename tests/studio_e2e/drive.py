@@ -47,16 +47,16 @@ class Page:
     def run(self, script):
         return self.driver.execute_script("return " + script)
 
-    def until(self, what, holds):
+    def until(self, what, holds, patience=PATIENCE):
         """Waits for something to hold; says what did not."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + patience
         while time.monotonic() < end:
             value = holds()
             if value:
                 return value
             time.sleep(0.05)
         self.driver.save_screenshot("studio_e2e_failed.png")
-        raise AssertionError(f"{what}: not within {PATIENCE} s")
+        raise AssertionError(f"{what}: not within {patience} s")
 
     def verdict(self, name):
         self.until(f"the verdict {name}", lambda: self.run("document.getElementById('verdict').dataset.verdict") == name)
@@ -162,7 +162,7 @@ def drive(page, folder):
 
 
 def screenshot(page, path):
-    page.until("a picture", lambda: page.run("document.getElementById('progress').textContent").startswith("256/"))
+    page.until("a picture", lambda: page.run("document.getElementById('progress').textContent").startswith("256/"), 600)
     page.until("the curves", lambda: page.run("document.querySelectorAll('#albedo .curve').length") > 1)
     page.until("the cost", lambda: page.run("document.querySelectorAll('#cost td').length") > 4)
     box = page.run("(() => { const b = document.getElementById('viewer').getBoundingClientRect(); return [b.x + b.width * 0.62, b.y + b.height * 0.36]; })()")

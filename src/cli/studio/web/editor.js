@@ -69,8 +69,8 @@ export class Editor {
     area.addEventListener("input", () => {
       // What is typed moves the marks behind it until the next check.
       this.close();
-      this.draw();
       this.changed();
+      this.draw();
       if (/[\w"]$/.test(this.text.slice(0, area.selectionStart))) this.suggest(false);
     });
     area.addEventListener("scroll", () => this.scroll());

@@ -104,10 +104,17 @@ async function measure() {
   }
 }
 
-/** What the script is set to, or how it is shown, has changed. */
+let owing = false;
+/** What the script is set to, or how it is shown, has changed: first its picture, then what is measured. */
 function changed() {
   if (current.good === undefined) return;
+  owing = true;
   viewer.render();
+}
+
+function settle() {
+  if (!owing) return;
+  owing = false;
   accountSoon();
   polarSoon();
 }
@@ -135,22 +142,33 @@ async function compile() {
 function onCompiled(message, text) {
   compiled = message;
   if (message.ok) {
-    say(null);
     for (const name of message.refused) delete current.values[name];
-    parameters.declare(message.parameters, current.values);
-    editor.parameters = message.parameters;
     current.good = text;
     changed();
+    say(null);
+    parameters.declare(message.parameters, current.values);
+    editor.parameters = message.parameters;
   } else {
     report = null;
     accounts.stop();
     energy.verdict($("verdict"), { verdict: "error" });
+    if (current.good === undefined) {
+      // Nothing of another document stays behind.
+      viewer.clear();
+      parameters.declare([], current.values);
+      energy.shares($("shares"), null);
+      curves = null;
+      plots.albedo($("albedo"), null);
+      plots.polar($("polar"), null, energy.colour);
+      $("cost").replaceChildren();
+    }
   }
   $("stale").hidden = message.ok || current.good === undefined;
   messages();
 }
 
 function onFramed(message, slot) {
+  if (slot === "a") settle();
   if (slot === "a" && message.samples === message.of) measureSoon();
 }
 
@@ -230,7 +248,7 @@ async function open(path) {
 }
 
 function create() {
-  documents.push({ path: null, text: START, kept: "", stamp: null, values: {} });
+  documents.push({ path: null, text: START, kept: START, stamp: null, values: {} });
   select(documents.at(-1));
   editor.area.focus();
 }
@@ -446,8 +464,8 @@ async function start() {
   editor = new Editor($("editor"), new Language(words), () => {
     current.text = editor.text;
     current.note = "";
-    tabs();
     compile();
+    tabs();
   });
   parameters = new Parameters($("parameters"), changed);
   controls();
@@ -455,7 +473,10 @@ async function start() {
   current = documents[0];
   viewer = new Viewer($("viewer"), (slot) => ({ ...script(slot), ...scenery() }), {
     framed: onFramed,
-    failed: (error) => say(error.message),
+    failed: (error) => {
+      say(error.message);
+      settle();
+    },
     pointed: (spot) => {
       pointed = spot;
       polarSoon();

@@ -75,6 +75,14 @@ export class Viewer {
     if (this.comparing) this.panes.b.latest.ask(question("b"));
   }
 
+  clear() {
+    for (const pane of Object.values(this.panes)) {
+      pane.latest.stop();
+      pane.canvas.getContext("2d").clearRect(0, 0, pane.canvas.width, pane.canvas.height);
+    }
+    this.progress.textContent = "";
+  }
+
   compare(on) {
     this.comparing = on;
     this.panes.b.canvas.hidden = !on;
