@@ -55,7 +55,7 @@ class Page:
             if value:
                 return value
             time.sleep(0.05)
-        self.driver.save_screenshot("studio_e2e_failed.png")
+        self.driver.save_screenshot(str(pathlib.Path(tempfile.gettempdir()) / "studio_e2e_failed.png"))
         raise AssertionError(f"{what}: not within {patience} s")
 
     def verdict(self, name):
