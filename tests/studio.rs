@@ -145,6 +145,8 @@ fn only_the_page_that_was_opened_is_answered() {
     {
         assert_eq!(studio.send(method, path, &[], "{}").status, 403, "{path}");
     }
+    let begins = studio.get("/api/files").json();
+    assert_eq!((&begins["tier"], &begins["layering"]), (&json!("standard"), &json!("min")));
     // The loopback alone: another address of this machine is not listened on.
     assert!(TcpStream::connect_timeout(&([127, 0, 0, 2], studio.port).into(), Duration::from_millis(300)).is_err());
     let page = studio.send("GET", "/", &[], "");

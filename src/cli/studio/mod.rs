@@ -46,6 +46,9 @@ pub struct StudioArgs {
 }
 
 pub fn run(global: &Global, args: &StudioArgs) -> Outcome {
+    if !global.set.is_empty() {
+        return Err(Failure::usage("--set: the studio's page sets parameters, for each script its own"));
+    }
     let unusable = |e: &dyn std::fmt::Display| Failure::usage(format!("cannot open `{}`: {e}", args.path.display()));
     let (folder, first) = if args.path.is_dir() {
         (Folder::new(&args.path, true), None)

@@ -1,7 +1,7 @@
 //! What is kept between questions: materials, stages, and what is under way.
 
-use super::super::Global;
 use super::super::host::CliHost;
+use super::super::{Global, TierArg};
 use super::guard::Folder;
 use super::http::Refusal;
 use super::hush::Hush;
@@ -11,6 +11,7 @@ use crate::globals::Globals;
 use crate::ir::{Host, Lookup, Speech, Subject};
 use crate::preview::{Environment, RenderSettings, Scene, Stage, lamp, output};
 use crate::syntax::{Directories, Includes, Limits};
+use clap::ValueEnum;
 use serde_json::{Value, json};
 use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -32,6 +33,8 @@ pub struct Workshop {
     first: Option<String>,
     includes: Vec<PathBuf>,
     quiet: bool,
+    /// What the page begins with: tier and layering rule.
+    begins: [String; 2],
     engine: Engine,
     /// Counts the changes made to files, so that nothing older is taken from what is kept.
     changes: AtomicU64,
@@ -53,12 +56,17 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Workshop {
     pub fn new(folder: Folder, first: Option<String>, global: &Global) -> Workshop {
+        fn word(value: impl ValueEnum) -> String {
+            value.to_possible_value().map_or(String::new(), |v| v.get_name().to_owned())
+        }
+        let begins = [word(global.tier.unwrap_or(TierArg::Standard)), word(global.layering)];
         let engine = global.engine().limits(Limits { script_bytes: 1 << 20, ..Limits::default() });
         Workshop {
             folder,
             first,
             includes: global.include.clone(),
             quiet: global.quiet,
+            begins,
             engine,
             changes: AtomicU64::new(0),
             listeners: Mutex::default(),
@@ -157,8 +165,9 @@ impl Workshop {
     pub fn files(&self) -> Value {
         let scripts = self.folder.list(&["osl"]);
         let first = self.first.clone().or_else(|| scripts.first().cloned());
+        let [tier, layering] = &self.begins;
         let name = self.folder.root().file_name().map(|n| n.to_string_lossy().into_owned());
-        json!({ "folder": name, "scripts": scripts, "first": first, "lights": self.folder.list(&LIGHTS) })
+        json!({ "folder": name, "scripts": scripts, "first": first, "lights": self.folder.list(&LIGHTS), "tier": tier, "layering": layering })
     }
 
     pub fn open(&self, name: &str) -> Result<Value, Refusal> {

@@ -488,7 +488,10 @@ async function start() {
   });
   keys();
   new ResizeObserver(redraw).observe($("albedo"));
-  const { first } = await files();
+  const { first, tier, layering } = await files();
+  Object.assign(choices, { tier, layering });
+  $("tier").value = tier;
+  $("layering").value = layering;
   documents.length = 0;
   if (first) await open(first);
   if (!documents.length) {
