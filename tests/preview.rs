@@ -7,8 +7,8 @@ use overcoat::closure::{Eval, Sample, SampleFlags};
 use overcoat::engine::ShadeError;
 use overcoat::preview::output::{self, Format};
 use overcoat::preview::{
-    Control, Environment, Image, Mesh, RenderError, RenderSettings, Rendered, Scatter, Scene, Stage, Surface, display,
-    drape_mesh, render, strip,
+    Control, Environment, Image, Mesh, Pass, RenderError, RenderSettings, Rendered, Scatter, Scene, Stage, Surface,
+    View, display, drape_mesh, render, strip,
 };
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::OnceLock;
@@ -123,7 +123,7 @@ fn a_white_sphere_vanishes_in_the_furnace() {
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    for scene in [Scene::Sphere, Scene::Drape] {
+    for scene in [Scene::Sphere, Scene::Ball, Scene::Drape] {
         let one = shown(&WHITE, &RenderSettings { threads: 1, ..settings(scene, 20, 4) });
         let two = shown(&WHITE, &RenderSettings { threads: 2, ..settings(scene, 20, 4) });
         assert_eq!(one.image.data(), two.image.data());
@@ -144,6 +144,48 @@ fn sampling_the_light_changes_only_the_noise() {
             assert!((a[c] / b[c] - 1.0).abs() < 0.01, "{scene:?}: {a:?} {b:?}");
         }
     }
+}
+
+#[test]
+fn passes_add_up_to_the_picture() {
+    let stage = Stage::new(&settings(Scene::Ball, 16, 8)).expect("a stage");
+    let whole = stage.render(&WHITE, Control::quiet()).expect("a picture").image;
+    let pass = |samples| {
+        let pass = Pass { width: 16, height: 16, view: View::default(), seed: 0, samples };
+        stage.pass(&WHITE, &pass, Control::quiet()).expect("a picture").image
+    };
+    let (first, rest) = (pass(0..3), pass(3..8));
+    for ((a, b), all) in first.data().iter().zip(rest.data()).zip(whole.data()) {
+        assert!(((3.0 * a + 5.0 * b) / 8.0 - all).abs() < 1e-4, "{a} {b} {all}");
+    }
+    let none = Pass { width: 16, height: 16, view: View::default(), seed: 0, samples: 3..3 };
+    assert!(stage.pass(&WHITE, &none, Control::quiet()).is_err());
+}
+
+#[test]
+fn a_scene_is_seen_from_all_around_and_never_from_below_the_floor() {
+    let look = |scene, turn: f32, rise: f32, distance: f32, [x, y]: [f32; 2]| {
+        let view = View { turn, rise, distance };
+        let pass = Pass { width: 16, height: 16, view, seed: 0, samples: 0..1 };
+        Stage::new(&settings(scene, 16, 1)).expect("a stage").point(&pass, x, y)
+    };
+    let middle = [0.5, 0.5];
+    for scene in [Scene::Sphere, Scene::Ball, Scene::Drape, Scene::Furnace] {
+        let front = look(scene, 0.0, 0.0, 1.0, middle).expect("the subject");
+        assert!(front.n.dot(front.i) < 0.0 && (front.n.length() - 1.0).abs() < 1e-4);
+        let side = look(scene, 1.0, 0.0, 1.0, middle).expect("the subject");
+        let level = |i: Vec3| Vec3::new(i.x, 0.0, i.z).normalize();
+        assert!((level(front.i).dot(level(side.i)) - 1f32.cos()).abs() < 1e-3, "{scene:?}");
+        let above = look(scene, 0.0, 9.0, 1.0, middle).expect("the subject");
+        assert!(above.i.y < -0.99 && above.i.is_finite());
+        let below = look(scene, 0.0, -9.0, 1.0, middle).expect("the subject");
+        assert!(if scene == Scene::Furnace { below.i.y > 0.99 } else { below.i.y < 0.2 }, "{scene:?}: {}", below.i);
+        assert!(look(scene, 0.0, 0.0, 1.0, [0.02, 0.02]).is_none());
+    }
+    // Closer is larger.
+    let corner = [0.2, 0.2];
+    assert!(look(Scene::Furnace, 0.0, 0.0, 1.0, corner).is_none());
+    assert!(look(Scene::Furnace, 0.0, 0.0, 0.4, corner).is_some());
 }
 
 /// A small bright patch, a black half, bad values.

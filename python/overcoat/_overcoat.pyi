@@ -65,7 +65,7 @@ class Material:
         size: int = 256,
         spp: int = 16,
         *,
-        scene: Literal["sphere", "drape", "furnace"] = "sphere",
+        scene: Literal["sphere", "ball", "drape", "furnace"] = "sphere",
         seed: int = 0,
         threads: int = 0,
     ) -> NDArray[np.float32]:

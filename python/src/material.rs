@@ -226,7 +226,7 @@ impl Material {
         tree::dictionary(py, &tree)
     }
 
-    /// A picture (size, size, 3) of linear radiance. scene: 'sphere', 'drape' or 'furnace'.
+    /// A picture (size, size, 3) of linear radiance. scene: 'sphere', 'ball', 'drape' or 'furnace'.
     #[pyo3(signature = (size = 256, spp = 16, *, scene = "sphere", seed = 0, threads = 0))]
     fn render<'py>(
         &self,
@@ -237,7 +237,7 @@ impl Material {
         seed: u64,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let scenes = [("sphere", Scene::Sphere), ("drape", Scene::Drape), ("furnace", Scene::Furnace)];
+        let scenes = [("sphere", Scene::Sphere), ("ball", Scene::Ball), ("drape", Scene::Drape), ("furnace", Scene::Furnace)];
         let scene = choose("scene", scene, &scenes)?;
         let settings =
             RenderSettings { scene, spp, width: size, height: size, seed, threads, ..RenderSettings::default() };

@@ -103,14 +103,20 @@ fn measure<S: Evaluate>(material: &Material, cosines: &[f64], args: &AlbedoArgs)
         let direction = [sin * phi.cos(), sin * phi.sin(), cos];
         let w = direction.map(S::c);
         let albedo = albedo(&subject, side, w, tolerance);
-        let explained = args.explain.then(|| explain::<S>(material, &globals, w, &albedo));
+        let explained = args.explain.then(|| explain::<S>(material, &globals, w, &albedo, tolerance));
         Row { cos, direction, albedo, explained }
     });
     Ok(rows.collect())
 }
 
 /// Lobe by lobe what it scatters and what the layers above keep from it, then layer by layer, then what is absorbed.
-fn explain<S: Evaluate>(material: &Material, globals: &Globals, w: [S; 3], total: &Albedo) -> Value {
+pub(super) fn explain<S: Evaluate>(
+    material: &Material,
+    globals: &Globals,
+    w: [S; 3],
+    total: &Albedo,
+    tolerance: Tolerance,
+) -> Value {
     let seen = Globals { i: glam::Vec3::from_array(w.map(|x| -x.to_f32())), ..*globals };
     let black = |_| Bsdf::black();
     let Ok(tree) = material.tree(&seen) else { return Value::Null };
@@ -119,8 +125,8 @@ fn explain<S: Evaluate>(material: &Material, globals: &Globals, w: [S; 3], total
     if bsdf.lobe_count() > MAX_EXPLAINED {
         return json!({ "note": format!("{} lobes are too many to tell apart", bsdf.lobe_count()) });
     }
-    let shares = breakdown(&|_| part(&tree), w, TOLERANCE);
-    let ledger = ledger(&tree, part, material.layering(), w, TOLERANCE);
+    let shares = breakdown(&|_| part(&tree), w, tolerance);
+    let ledger = ledger(&tree, part, material.layering(), w, tolerance);
     explained(&bsdf, &shares, &ledger, total)
 }
 

@@ -81,7 +81,7 @@ pub fn run(global: &Global, args: &CheckArgs) -> Outcome {
 }
 
 /// Files as given, folders by name.
-fn collect(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
+pub(super) fn collect(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
     if path == Path::new("-") || !path.is_dir() {
         files.push(path.to_owned());
         return Ok(());
@@ -119,15 +119,8 @@ fn check(global: &Global, args: &CheckArgs, file: &Path) -> Result<Checked, Fail
         Ok(shader) => shader,
         Err(e) => return Ok(failed((*e.source).clone(), "", e.diagnostics)),
     };
-    // A tree beyond its budget has no BSDF to prove anything about.
-    let mut tree = ClosureTree::new();
-    let shaded = shader.checked().specialise(&[]).map(|program| program.shade(&crate::Globals::default(), &mut tree));
-    if let Ok(Err(e)) = shaded {
-        let message = Diagnostic::error("E0110", crate::span::Span::default(), e.to_string());
-        return Ok(failed(shader.source().clone(), shader.name(), vec![message]));
-    }
     let options = options(global, args, &shader)?;
-    let report = match prove(&shader, &options) {
+    let report = match judge(&shader, &options) {
         Ok(report) => report,
         Err(diagnostics) if diagnostics.iter().all(|d| d.code.starts_with("E04")) => {
             return Err(global.setting_failed(&diagnostics, shader.source()));
@@ -141,6 +134,17 @@ fn check(global: &Global, args: &CheckArgs, file: &Path) -> Result<Checked, Fail
     let diagnostics = shader.warnings().iter().chain(&report.diagnostics).cloned().collect();
     let (source, name) = (shader.source().clone(), shader.name().to_owned());
     Ok(Checked { source, shader: name, report: Some(report), diagnostics, contradictions })
+}
+
+/// The proof, for a script whose tree stays within its budget at all.
+pub(super) fn judge(shader: &Shader, options: &Options) -> Result<Report, Vec<Diagnostic>> {
+    // A tree beyond its budget has no BSDF to prove anything about.
+    let mut tree = ClosureTree::new();
+    let shaded = shader.checked().specialise(&[]).map(|program| program.shade(&crate::Globals::default(), &mut tree));
+    if let Ok(Err(e)) = shaded {
+        return Err(vec![Diagnostic::error("E0110", crate::span::Span::default(), e.to_string())]);
+    }
+    prove(shader, options)
 }
 
 fn failed(source: Source, shader: &str, diagnostics: Vec<Diagnostic>) -> Checked {
@@ -229,7 +233,7 @@ fn to_json(checked: &Checked) -> Value {
     })
 }
 
-fn witness(w: &Witness) -> Value {
+pub(super) fn witness(w: &Witness) -> Value {
     let value = |v: &ir::Value| match (v, v.numbers().as_slice()) {
         (ir::Value::String(text), _) => json!(text),
         (ir::Value::Int(i), _) => json!(i),

@@ -24,7 +24,7 @@ pub fn run(global: &Global, file: &Path) -> Outcome {
     output::write(&text)
 }
 
-fn measure(material: &Material) -> Result<Value, Failure> {
+pub(super) fn measure(material: &Material) -> Result<Value, Failure> {
     let program = material.program();
     let lobes: BTreeSet<&str> = program.sites().iter().map(|s| s.kind.spec().name).collect();
     let globals: Vec<&str> = program.globals().iter().map(|g| g.name()).collect();

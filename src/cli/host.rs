@@ -9,6 +9,8 @@ use std::sync::{Arc, Mutex};
 /// Loads pictures beside the script or in the include directories, each once; prints to stderr.
 pub struct CliHost {
     directories: Vec<PathBuf>,
+    /// Whether pictures elsewhere are none.
+    confined: bool,
     quiet: bool,
     pictures: Mutex<HashMap<String, Option<Arc<Picture>>>>,
     /// What has been printed: a script says the same at every point.
@@ -29,7 +31,13 @@ impl CliHost {
     pub fn new(path: &Path, include: &[PathBuf], quiet: bool) -> Self {
         let beside = path.parent().map(Path::to_owned);
         let directories = beside.into_iter().chain(include.iter().cloned()).collect();
-        CliHost { directories, quiet, pictures: Mutex::default(), said: Mutex::default() }
+        CliHost { directories, confined: false, quiet, pictures: Mutex::default(), said: Mutex::default() }
+    }
+
+    /// Pictures below these folders, links followed, and no others.
+    #[cfg(feature = "studio")]
+    pub fn confined(directories: Vec<PathBuf>, quiet: bool) -> Self {
+        CliHost { directories, confined: true, quiet, pictures: Mutex::default(), said: Mutex::default() }
     }
 
     fn picture(&self, name: &str) -> Option<Arc<Picture>> {
@@ -47,10 +55,19 @@ impl CliHost {
     }
 
     fn load(&self, name: &str) -> Option<Picture> {
-        let found = self.directories.iter().map(|d| d.join(name)).find(|path| path.is_file());
-        let opened = image::open(found.unwrap_or_else(|| PathBuf::from(name))).ok()?;
+        let found = self.directories.iter().map(|d| d.join(name)).find(|path| path.is_file() && self.allowed(path));
+        let path = found.or_else(|| (!self.confined).then(|| PathBuf::from(name)))?;
+        let opened = image::open(path).ok()?;
         let encoded = matches!(opened.color().bytes_per_pixel() / opened.color().channel_count(), 1);
         Some(Picture { pixels: opened.into_rgba32f(), encoded })
+    }
+}
+
+impl CliHost {
+    fn allowed(&self, path: &Path) -> bool {
+        let below =
+            |folder: &PathBuf| folder.canonicalize().is_ok_and(|f| path.canonicalize().is_ok_and(|p| p.starts_with(f)));
+        !self.confined || self.directories.iter().any(below)
     }
 }
 

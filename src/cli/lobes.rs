@@ -87,7 +87,7 @@ pub fn header() -> Outcome {
     output::write(&text)
 }
 
-fn describe(form: &Form) -> Value {
+pub(super) fn describe(form: &Form) -> Value {
     let params: Vec<Value> = form
         .params
         .iter()

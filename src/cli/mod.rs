@@ -8,15 +8,19 @@ mod cost;
 mod eval;
 mod explain;
 mod furnace;
+mod gallery;
 mod host;
 mod input;
 mod lobes;
 mod output;
+mod plot;
 mod reciprocity;
 mod reference;
 mod render;
 mod reproduce;
 mod sample;
+#[cfg(feature = "studio")]
+mod studio;
 mod tree;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -137,6 +141,10 @@ enum Command {
     },
     /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
     Furnace(furnace::FurnaceArgs),
+    /// Draw how the material scatters, where its energy goes, and how noisily it is sampled, as an SVG.
+    Plot(plot::PlotArgs),
+    /// Show every script of a folder on every scene, as one page.
+    Gallery(gallery::GalleryArgs),
     /// Does the material scatter alike when light and viewer change places?
     Reciprocity(reciprocity::ReciprocityArgs),
     /// List the closures a script can call.
@@ -157,6 +165,9 @@ enum Command {
     Render(render::RenderArgs),
     /// Make the figures of the papers the lobes come from, with what they say and what was measured.
     Reproduce(reproduce::ReproduceArgs),
+    /// Edit a material in the browser: its picture, its parameters, where its energy goes.
+    #[cfg(feature = "studio")]
+    Studio(studio::StudioArgs),
 }
 
 /// Why a command stops.
@@ -194,6 +205,8 @@ pub fn main() -> ExitCode {
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Explain { code } => explain::run(&cli.global, code.as_deref()),
         Command::Furnace(args) => furnace::run(&cli.global, args),
+        Command::Gallery(args) => gallery::run(&cli.global, args),
+        Command::Plot(args) => plot::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { header: true, .. } => lobes::header(),
         Command::Lobes { markdown: true, .. } => reference::markdown(),
@@ -201,6 +214,8 @@ pub fn main() -> ExitCode {
         Command::Lobes { name, .. } => lobes::run(&cli.global, name.as_deref()),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
+        #[cfg(feature = "studio")]
+        Command::Studio(args) => studio::run(&cli.global, args),
     };
     match outcome {
         Ok(()) | Err(Failure::Closed) => ExitCode::SUCCESS,

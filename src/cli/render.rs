@@ -78,13 +78,26 @@ impl RenderArgs {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum SceneArg {
+pub(super) enum SceneArg {
     /// A sphere on a neutral floor.
     Sphere,
+    /// A ball with two grooves on a foot.
+    Ball,
     /// A cloth hanging over a ball.
     Drape,
     /// A sphere in uniform white light: a lossless white material cannot be seen.
     Furnace,
+}
+
+impl SceneArg {
+    pub(super) fn scene(self) -> Scene {
+        match self {
+            SceneArg::Sphere => Scene::Sphere,
+            SceneArg::Ball => Scene::Ball,
+            SceneArg::Drape => Scene::Drape,
+            SceneArg::Furnace => Scene::Furnace,
+        }
+    }
 }
 
 pub fn run(global: &Global, args: &RenderArgs) -> Outcome {
@@ -102,13 +115,8 @@ fn settings(args: &RenderArgs) -> Result<RenderSettings, Failure> {
     if !args.exposure.is_finite() {
         return Err(Failure::usage(format!("--exposure {}: expected a number of stops", args.exposure)));
     }
-    let scene = match args.scene {
-        SceneArg::Sphere => Scene::Sphere,
-        SceneArg::Drape => Scene::Drape,
-        SceneArg::Furnace => Scene::Furnace,
-    };
     Ok(RenderSettings {
-        scene,
+        scene: args.scene.scene(),
         env: args.env.clone(),
         spp: args.spp,
         width,
@@ -129,7 +137,7 @@ fn size(text: &str) -> Result<(u32, u32), Failure> {
     parsed.ok_or_else(|| Failure::usage(format!("--size {text}: expected pixels, as in 512 or 640x360")))
 }
 
-fn render_failed(e: RenderError) -> Failure {
+pub(super) fn render_failed(e: RenderError) -> Failure {
     match e {
         RenderError::Shade(e) => Failure::from(e),
         other => Failure::usage(other.to_string()),

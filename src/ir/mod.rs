@@ -24,6 +24,8 @@ mod wide;
 
 pub use batch::Batch;
 pub use body::GlobalVar;
+#[cfg(feature = "studio")]
+pub(crate) use check::TASKS;
 pub(crate) use host::Answers;
 pub use host::{Host, Lookup, Speech, Subject};
 pub use program::{Program, ShadeError, Site};

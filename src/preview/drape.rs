@@ -217,7 +217,7 @@ fn beyond(i: i32, n: i32, f: impl Fn(i32) -> Vec3) -> Vec3 {
 }
 
 /// The four cubic B-spline weights at `t` in [0, 1], and their derivatives.
-fn weights(t: f32) -> ([f32; 4], [f32; 4]) {
+pub(super) fn weights(t: f32) -> ([f32; 4], [f32; 4]) {
     let s = 1.0 - t;
     let value = [s * s * s, 3.0 * t * t * t - 6.0 * t * t + 4.0, 3.0 * s * s * s - 6.0 * s * s + 4.0, t * t * t];
     let slope = [-s * s, (3.0 * t - 4.0) * t, (4.0 - 3.0 * s) * s, t * t];

@@ -6,19 +6,19 @@
 use super::camera::Camera;
 use super::integrator::{Tally, Tracer};
 use super::sampler::{Sampler, pixel_seed};
-use super::{Control, Image, RenderError, RenderSettings, Surface};
+use super::{Control, Image, Pass, RenderError, Surface};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Renders every pixel on the threads of the current pool.
 pub fn expose<S: Surface>(
-    settings: &RenderSettings,
+    pass: &Pass,
     camera: &Camera,
     tracer: &Tracer<'_, S>,
     control: Control<'_>,
 ) -> Result<(Image, Tally), RenderError> {
-    let (width, height) = (settings.width as usize, settings.height as usize);
+    let (width, height) = (pass.width as usize, pass.height as usize);
     let filter = Filter::new();
     let mut data = vec![0.0f32; 3 * width * height];
     let done = AtomicU64::new(0);
@@ -31,7 +31,7 @@ pub fn expose<S: Surface>(
                 if control.cancel.load(Ordering::Relaxed) {
                     return Err(RenderError::Cancelled);
                 }
-                let rgb = expose_pixel(settings, camera, tracer, &filter, [x as u32, y as u32], &mut tally)?;
+                let rgb = expose_pixel(pass, camera, tracer, &filter, [x as u32, y as u32], &mut tally)?;
                 pixel.copy_from_slice(&rgb);
             }
             (control.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, height as u64);
@@ -43,26 +43,26 @@ pub fn expose<S: Surface>(
     for row in rows {
         total.add(row?);
     }
-    let image = Image::from_vec(settings.width, settings.height, data).expect("three values a pixel");
+    let image = Image::from_vec(pass.width, pass.height, data).expect("three values a pixel");
     Ok((image, total))
 }
 
 /// The mean of one pixel's samples. Summed in f64: f32 would lose the later of 65,536 samples.
 fn expose_pixel<S: Surface>(
-    settings: &RenderSettings,
+    pass: &Pass,
     camera: &Camera,
     tracer: &Tracer<'_, S>,
     filter: &Filter,
     [x, y]: [u32; 2],
     tally: &mut Tally,
 ) -> Result<[f32; 3], RenderError> {
-    let pixel = pixel_seed(settings.seed, x, y);
+    let pixel = pixel_seed(pass.seed, x, y);
     let mut sum = [0.0f64; 3];
-    for index in 0..settings.spp {
+    for index in pass.samples.clone() {
         let mut sampler = Sampler::new(pixel, index);
         let [u, v, ..] = sampler.next4();
-        let film_x = (x as f32 + 0.5 + filter.offset(u)) / settings.width as f32;
-        let film_y = (y as f32 + 0.5 + filter.offset(v)) / settings.height as f32;
+        let film_x = (x as f32 + 0.5 + filter.offset(u)) / pass.width as f32;
+        let film_y = (y as f32 + 0.5 + filter.offset(v)) / pass.height as f32;
         let radiance = tracer.radiance(camera.ray(film_x, film_y), &mut sampler, tally).map_err(RenderError::Shade)?;
         if sane(radiance) {
             for c in 0..3 {
@@ -72,7 +72,7 @@ fn expose_pixel<S: Surface>(
             tally.invalid += 1;
         }
     }
-    Ok(sum.map(|s| (s / f64::from(settings.spp)).min(f64::from(f32::MAX)) as f32))
+    Ok(sum.map(|s| (s / pass.samples.len() as f64).min(f64::from(f32::MAX)) as f32))
 }
 
 fn sane(radiance: Vec3) -> bool {

@@ -55,7 +55,7 @@ struct Path {
 }
 
 /// Where rays leave a scattering point.
-struct Exits {
+pub(super) struct Exits {
     n: Vec3,
     /// On the side of `n`, and on the other.
     near: Vec3,
@@ -220,7 +220,7 @@ fn power_heuristic(p: f32, q: f32) -> f32 {
 
 /// The point as a viewer along `wo` sees it: normals on the viewer's side. An interpolated normal that turns away from
 /// the viewer all the same is bent back until it just faces it; the BSDF is never told otherwise.
-fn face(point: &Point, wo: Vec3) -> (Globals, Exits) {
+pub(super) fn face(point: &Point, wo: Vec3) -> (Globals, Exits) {
     const FACING: f32 = 0.02;
     let backfacing = point.ng.dot(wo) < 0.0;
     let side = if backfacing { -1.0 } else { 1.0 };

@@ -8,6 +8,7 @@
 //! The world is y-up, in arbitrary units in which the sphere's radius is one. The same settings give the same picture,
 //! bit for bit, whatever the number of threads.
 
+mod ball;
 mod camera;
 mod drape;
 mod environment;
@@ -26,6 +27,7 @@ mod studio;
 mod surface;
 mod tone;
 
+pub use ball::ball_mesh;
 pub use drape::drape_mesh;
 pub use environment::Environment;
 pub use image::Image;
@@ -35,7 +37,9 @@ pub use surface::{Scatter, Surface};
 pub use tone::display;
 
 use crate::engine::ShadeError;
+use crate::globals::Globals;
 use std::fmt;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -45,10 +49,46 @@ use std::time::Instant;
 pub enum Scene {
     /// A sphere on a neutral floor.
     Sphere,
+    /// A ball with two grooves on a foot.
+    Ball,
     /// A square cloth hanging over a ball, its corners on the floor.
     Drape,
     /// A sphere in uniform white light, without a floor: a lossless white material cannot be seen.
     Furnace,
+}
+
+/// Where a scene is seen from, relative to its own point of view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Around the vertical, in radians; positive: the viewer goes to the right.
+    pub turn: f32,
+    /// Upward, in radians. Ends above the floor and short of straight down.
+    pub rise: f32,
+    /// Times the scene's own distance, 0.25 to 4.
+    pub distance: f32,
+}
+
+impl Default for View {
+    /// The scene's own.
+    fn default() -> Self {
+        View { turn: 0.0, rise: 0.0, distance: 1.0 }
+    }
+}
+
+/// Some of the samples of a picture: pictures of one size and view, each weighted by its number of samples, add up to
+/// what [`Stage::render`] makes of all of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pass {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Where the scene is seen from.
+    pub view: View,
+    /// Same seed, same picture.
+    pub seed: u64,
+    /// Which of every pixel's samples to take, at least one.
+    pub samples: Range<u32>,
 }
 
 /// Everything but the material that decides a picture.
@@ -194,7 +234,6 @@ pub fn render<S: Surface>(
 pub struct Stage {
     settings: RenderSettings,
     world: scene::World,
-    camera: camera::Camera,
     pool: rayon::ThreadPool,
 }
 
@@ -218,27 +257,50 @@ impl Stage {
             .num_threads(settings.threads)
             .build()
             .map_err(|e| RenderError::Threads(e.to_string()))?;
-        let aspect = settings.width as f32 / settings.height as f32;
-        Ok(Stage {
-            settings: settings.clone(),
-            world: scene::World::new(settings.scene, environment),
-            camera: scene::camera(settings.scene, aspect),
-            pool,
-        })
+        Ok(Stage { settings: settings.clone(), world: scene::World::new(settings.scene, environment), pool })
     }
 
     /// Shows one material.
     pub fn render<S: Surface>(&self, surface: &S, control: Control<'_>) -> Result<Rendered, RenderError> {
+        let RenderSettings { width, height, seed, spp, .. } = self.settings;
+        self.pass(surface, &Pass { width, height, view: View::default(), seed, samples: 0..spp }, control)
+    }
+
+    /// Shows one material from anywhere, with some of the samples: for pictures that refine while they are looked at.
+    /// Of the stage's settings it uses neither size nor seed nor number of samples.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    pub fn pass<S: Surface>(&self, surface: &S, pass: &Pass, control: Control<'_>) -> Result<Rendered, RenderError> {
+        check_size(pass.width, pass.height)?;
+        if pass.samples.is_empty() {
+            return Err(RenderError::Settings("a pass without samples".into()));
+        }
         let start = Instant::now();
         let tracer = integrator::Tracer::new(&self.world, surface, &self.settings);
-        let (image, tally) = self.pool.install(|| film::expose(&self.settings, &self.camera, &tracer, control))?;
+        let camera = self.camera(pass);
+        let (image, tally) = self.pool.install(|| film::expose(pass, &camera, &tracer, control))?;
         let stats = Stats {
             seconds: start.elapsed().as_secs_f64(),
-            samples: u64::from(self.settings.spp) * u64::from(image.width()) * u64::from(image.height()),
+            samples: pass.samples.len() as u64 * u64::from(image.width()) * u64::from(image.height()),
             rays: tally.rays,
             invalid: tally.invalid,
         };
         Ok(Rendered { image, stats })
+    }
+
+    /// What is seen at a place of the picture, `x` and `y` from 0 to 1 from the upper left corner: the shading point,
+    /// its normals toward the viewer. `None` beside the subject.
+    pub fn point(&self, pass: &Pass, x: f32, y: f32) -> Option<Globals> {
+        let ray = self.camera(pass).ray(x, y);
+        match self.world.hit(ray) {
+            scene::Hit::Subject(point) => Some(integrator::face(&point, -ray.dir).0),
+            scene::Hit::Floor { .. } | scene::Hit::Nothing => None,
+        }
+    }
+
+    fn camera(&self, pass: &Pass) -> camera::Camera {
+        scene::camera(self.settings.scene, pass.view, pass.width as f32 / pass.height as f32)
     }
 }
 
@@ -247,14 +309,20 @@ pub const MAX_SIZE: u32 = 16_384;
 /// The most pixels of one picture.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
+fn check_size(width: u32, height: u32) -> Result<(), RenderError> {
+    let wrong = |what: String| Err(RenderError::Settings(what));
+    if width == 0 || height == 0 || width > MAX_SIZE || height > MAX_SIZE {
+        return wrong(format!("a picture of {width}×{height} pixels: each side must lie in 1 to {MAX_SIZE}"));
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return wrong(format!("a picture of {width}×{height} pixels is larger than {MAX_PIXELS} pixels"));
+    }
+    Ok(())
+}
+
 fn check(s: &RenderSettings) -> Result<(), RenderError> {
     let wrong = |what: String| Err(RenderError::Settings(what));
-    if s.width == 0 || s.height == 0 || s.width > MAX_SIZE || s.height > MAX_SIZE {
-        return wrong(format!("a picture of {}×{} pixels: each side must lie in 1 to {MAX_SIZE}", s.width, s.height));
-    }
-    if u64::from(s.width) * u64::from(s.height) > MAX_PIXELS {
-        return wrong(format!("a picture of {}×{} pixels is larger than {MAX_PIXELS} pixels", s.width, s.height));
-    }
+    check_size(s.width, s.height)?;
     if s.spp == 0 {
         return wrong("0 samples per pixel: at least 1 is needed".into());
     }

@@ -46,6 +46,27 @@ impl Plot<'_> {
         Ok(text)
     }
 
+    /// The picture with one scale for both axes, the middle of the horizontal one at 0: for what is drawn around a
+    /// point.
+    ///
+    /// # Errors
+    /// If there is nothing finite to show.
+    pub fn svg_to_scale(&self) -> Result<String, String> {
+        // Of the area that the axes leave.
+        const ASPECT: f64 = 640.0 / 350.0;
+        let points = || self.series.iter().flat_map(|s| &s.1).filter(|p| p.0.is_finite() && p.1.is_finite());
+        let (x, up) = points().fold((1e-9f64, 1e-9f64), |(x, up), p| (x.max(p.0.abs()), up.max(p.1)));
+        let down = points().fold(0.0f64, |down, p| down.min(p.1));
+        if points().next().is_none() {
+            return Err(format!("{}: nothing to plot", self.title));
+        }
+        let height = ((up - down) * 1.04).max(2.0 * x * 1.02 / ASPECT);
+        let mut text = String::new();
+        let half = 0.5 * height * ASPECT;
+        self.draw(&mut text, [-half, half, down, down + height]).map_err(|e| e.to_string())?;
+        Ok(text)
+    }
+
     fn draw(&self, text: &mut String, [x0, x1, y0, y1]: [f64; 4]) -> Result<(), Box<dyn std::error::Error>> {
         let area = SVGBackend::with_string(text, (720, 440)).into_drawing_area();
         area.fill(&WHITE)?;

@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, Ray};
 use super::mesh::Mesh;
-use super::{Environment, Scene, drape, sphere};
+use super::{Environment, Scene, View, ball, drape, sphere};
 use glam::{Vec3, vec3};
 use std::sync::{Arc, OnceLock};
 
@@ -62,6 +62,7 @@ impl World {
         match scene {
             Scene::Sphere => World { subject: Subject::Sphere, floor, environment },
             Scene::Furnace => World { subject: Subject::Sphere, floor: None, environment },
+            Scene::Ball => World { subject: Subject::Mesh(ball_once()), floor, environment },
             Scene::Drape => World { subject: Subject::Mesh(drape_once()), floor, environment },
         }
     }
@@ -110,18 +111,35 @@ impl Floor {
     }
 }
 
-/// The point of view of each scene; `aspect` is width over height.
-pub fn camera(scene: Scene, aspect: f32) -> Camera {
+/// Where each scene is seen from; `aspect` is width over height.
+pub fn camera(scene: Scene, view: View, aspect: f32) -> Camera {
     let (eye, target, degrees) = match scene {
         Scene::Sphere => (vec3(0.0, 2.5, 7.2), vec3(0.0, 0.93, 0.0), 21.5),
         Scene::Furnace => (vec3(0.0, 1.0, 7.2), vec3(0.0, 1.0, 0.0), 21.5),
+        Scene::Ball => (vec3(0.0, 2.75, 7.2), vec3(0.0, 0.91, 0.0), 20.5),
         Scene::Drape => (vec3(1.2, 2.9, 7.2), vec3(0.03, 0.76, 0.0), 18.5),
     };
+    let eye = if view == View::default() { eye } else { orbit(eye, target, view, scene != Scene::Furnace) };
     Camera::look_at(eye, target, f32::to_radians(degrees), aspect)
+}
+
+/// The eye carried around its target; above the floor where there is one, and never straight above or below.
+fn orbit(eye: Vec3, target: Vec3, view: View, floor: bool) -> Vec3 {
+    const STEEPEST: f32 = 1.53;
+    let (from, distance) = (eye - target, (eye - target).length() * view.distance.clamp(0.25, 4.0));
+    let lowest = if floor { ((0.05 - target.y) / distance).clamp(-1.0, 1.0).asin() } else { -STEEPEST };
+    let rise = ((from.y / from.length()).asin() + view.rise).clamp(lowest, STEEPEST);
+    let turn = from.x.atan2(from.z) + view.turn;
+    target + vec3(rise.cos() * turn.sin(), rise.sin(), rise.cos() * turn.cos()) * distance
 }
 
 /// The drape takes a moment to fall, and always falls the same way.
 fn drape_once() -> Arc<Mesh> {
     static DRAPE: OnceLock<Arc<Mesh>> = OnceLock::new();
     DRAPE.get_or_init(|| Arc::new(drape::drape_mesh(drape::RESOLUTION))).clone()
+}
+
+fn ball_once() -> Arc<Mesh> {
+    static BALL: OnceLock<Arc<Mesh>> = OnceLock::new();
+    BALL.get_or_init(|| Arc::new(ball::ball_mesh(ball::RESOLUTION))).clone()
 }

@@ -8,6 +8,8 @@ mod layering;
 mod sheen;
 mod variance;
 
+pub(super) use variance::variances;
+
 use super::{Failure, Global, Outcome, output};
 use crate::engine::{Engine, Material};
 use crate::preview::output::save;

@@ -70,14 +70,15 @@ pub fn table(bench: &Bench<'_>) -> Result<Figure, Failure> {
 }
 
 /// Relative variance of f·cos/pdf under the lobe's own sampling and under uniform sampling of the hemisphere.
-fn variances(bsdf: &Bsdf<'_>) -> [f64; 2] {
+pub(in crate::cli) fn variances(bsdf: &Bsdf<'_>) -> [f64; 2] {
     const SIDE: u32 = 256;
     let (mut own, mut uniform) = (Moments::default(), Moments::default());
-    // A rank-1 lattice fills the unit square evenly.
+    // A rank-1 lattice fills the unit square evenly; the third number chooses among lobes.
     let count = SIDE * SIDE;
     for k in 0..count {
         let (a, b) = ((k as f64 + 0.5) / f64::from(count), (f64::from(k) * 0.618_033_988_749_895).fract());
-        let weight = bsdf.sample([a as f32, b as f32, 0.5]).map_or(0.0, |s| f64::from(s.weight[0]));
+        let chosen = (f64::from(k) * 0.754_877_666_246_693).fract().min(1.0 - 1e-7);
+        let weight = bsdf.sample([a as f32, b as f32, chosen as f32]).map_or(0.0, |s| f64::from(s.weight[0]));
         own.add(weight);
         let (z, phi) = (a, std::f64::consts::TAU * b);
         let r = (1.0 - z * z).sqrt();

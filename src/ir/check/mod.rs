@@ -32,6 +32,8 @@ use place::{At, Layout, Place};
 use std::collections::HashMap;
 use std::sync::Arc;
 pub(super) use suggest::suggest;
+#[cfg(feature = "studio")]
+pub(crate) use task::TASKS;
 
 /// Checks a parsed script. `answers`: what the host says anything about. Ok: the shader and its warnings.
 pub fn check(

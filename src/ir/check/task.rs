@@ -13,7 +13,7 @@ use crate::span::Span;
 use crate::syntax::ast;
 
 /// What is called by these names becomes statements.
-const TASKS: &[&str] = &[
+pub(crate) const TASKS: &[&str] = &[
     "arraylength",
     "concat",
     "determinant",
