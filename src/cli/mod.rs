@@ -7,6 +7,7 @@ mod check;
 mod cost;
 mod eval;
 mod explain;
+mod extremes;
 mod furnace;
 mod host;
 mod input;
@@ -17,6 +18,7 @@ mod reference;
 mod render;
 mod reproduce;
 mod sample;
+mod tradeoff;
 mod tree;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -135,6 +137,9 @@ enum Command {
         /// The code.
         code: Option<String>,
     },
+    /// Every lobe at the ends of its parameters and angles: is any result infinite, undefined or negative, and how large
+    /// do rounding errors get?
+    Extremes(extremes::ExtremesArgs),
     /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
     Furnace(furnace::FurnaceArgs),
     /// Does the material scatter alike when light and viewer change places?
@@ -153,6 +158,8 @@ enum Command {
         #[arg(long, value_name = "DIR", conflicts_with_all = ["name", "header", "markdown"])]
         gallery: Option<PathBuf>,
     },
+    /// What speed costs in accuracy: tiers, layering rules and table sizes, timed and compared with the reference.
+    Tradeoff(tradeoff::TradeoffArgs),
     /// Make a picture of the material.
     Render(render::RenderArgs),
     /// Make the figures of the papers the lobes come from, with what they say and what was measured.
@@ -193,12 +200,14 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Explain { code } => explain::run(&cli.global, code.as_deref()),
+        Command::Extremes(args) => extremes::run(&cli.global, args),
         Command::Furnace(args) => furnace::run(&cli.global, args),
         Command::Reciprocity(args) => reciprocity::run(&cli.global, args),
         Command::Lobes { header: true, .. } => lobes::header(),
         Command::Lobes { markdown: true, .. } => reference::markdown(),
         Command::Lobes { gallery: Some(folder), .. } => reference::gallery(&cli.global, folder),
         Command::Lobes { name, .. } => lobes::run(&cli.global, name.as_deref()),
+        Command::Tradeoff(args) => tradeoff::run(&cli.global, args),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
     };
