@@ -70,6 +70,8 @@ impl Tier {
 #[derive(Clone, Debug, Default)]
 pub struct Engine {
     tier: Tier,
+    /// In place of what the tier asks for.
+    precision: Option<Precision>,
     layering: Layering,
     /// Closures of the host, as scripts call them.
     hosts: Arc<[Form]>,
@@ -94,6 +96,16 @@ impl Engine {
     /// Chooses the tier of the materials made from here on.
     pub fn tier(self, tier: Tier) -> Self {
         Engine { tier, ..self }
+    }
+
+    /// Chooses how finely the tables of the single precision path are baked, in place of what the tier asks for. Coarser
+    /// ones are smaller and lose more; none gains.
+    pub fn precision(self, precision: Precision) -> Self {
+        Engine { precision: Some(precision), ..self }
+    }
+
+    fn precision_of(&self) -> Precision {
+        self.precision.unwrap_or(self.tier.precision())
     }
 
     /// Chooses how layers scale what lies below them.
@@ -209,7 +221,7 @@ impl Engine {
             Build::Lobe { kind, .. } => Some(kind),
             Build::Wrap { .. } | Build::Tinted { .. } | Build::Layer => None,
         });
-        let builder = Builder::new().layering(self.layering).precision(self.tier.precision());
+        let builder = Builder::new().layering(self.layering).precision(self.precision_of());
         builder.known(hosts, self.caches.single.clone())
     }
 
@@ -286,7 +298,7 @@ impl Shader {
     fn finished(&self, program: Program, set: &[(String, Value)]) -> Material {
         let start = Instant::now();
         let engine = &self.engine;
-        let tables = Baked::new(&program, engine.layering, engine.tier.precision(), &engine.caches.single);
+        let tables = Baked::new(&program, engine.layering, engine.precision_of(), &engine.caches.single);
         program.kept();
         let inner = Inner {
             shader: self.clone(),

@@ -158,3 +158,76 @@ fn explained_light_adds_up_to_one() {
         }
     }
 }
+
+#[test]
+fn extremes_are_counted_and_located() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let measure = |more: &[&str]| overcoat(folder.path(), &[&["extremes", "--cases", "100"], more].concat());
+    let output = measure(&["--lobe", "oren_nayar", "--json", "--seed", "3"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let found = document(&output);
+    let rows = found["rows"].as_array().expect("rows");
+    // Alone, and in two stacks under three rules, in three tiers.
+    assert_eq!((rows.len(), &found["faults"], &found["seed"]), (21, &Value::from(0), &Value::from(3)));
+    for row in rows {
+        assert!(row["lobe"] == "oren_nayar" && row["pairs"] == 128 && row["compared"].as_u64() <= Some(128), "{row}");
+        let (error, beyond) = (row["error"].as_f64().expect("a number"), row["beyond_rounding"].as_f64());
+        assert!(beyond.is_some_and(|b| b <= error), "{row}");
+        assert!(row["error_at"]["params"]["sigma"].is_array() || error == 0.0, "{row}");
+    }
+    assert_eq!(measure(&["--lobe", "oren_nayar", "--json", "--seed", "3"]).stdout, output.stdout);
+    let text = measure(&["--lobe", "diffuse"]);
+    assert!(String::from_utf8_lossy(&text.stdout).contains("below sheen"));
+    let typo = measure(&["--lobe", "difuse"]);
+    assert_eq!(status(&typo), 2);
+    assert!(String::from_utf8_lossy(&typo.stderr).contains("did you mean `diffuse`?"));
+}
+
+#[test]
+fn a_tradeoff_has_a_front() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let points = |subject: &Value| subject["points"].as_array().expect("points").clone();
+    let output = overcoat(here, &["tradeoff", "--lobe", "diffuse", "--json"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let lobe = document(&output)["subjects"][0].clone();
+    // A lobe without tables has one size of them, and no layer that a rule could scale.
+    assert_eq!((lobe["name"].as_str(), points(&lobe).len()), (Some("diffuse"), 3));
+    assert!(points(&lobe).iter().all(|p| p["layering"] == "-" && p["max_error"].as_f64() < Some(1e-6)), "{lobe}");
+
+    let file = script(here, "layered.osl", "Ci = sheen(diffuse(N), N, 1, 0.4);");
+    let output = overcoat(here, &["tradeoff", &file, "--json", "--svg", "t.svg"]);
+    assert_eq!(status(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let found = document(&output);
+    let all = points(&found["subjects"][0]);
+    // Three rules; two tiers with three sizes of tables, and the reference.
+    assert_eq!((all.len(), found["subjects"].as_array().map(Vec::len)), (21, Some(1)));
+    for p in &all {
+        let number = |v: &Value| v.as_f64().expect("a number");
+        let reference = p["tier"] == "reference";
+        assert_eq!((number(&p["max_error"]) == 0.0, p["ns"]["eval_batch"].is_null()), (reference, reference), "{p}");
+        // What the tiers promise; tables of half the size do not.
+        let promised = match (p["tier"].as_str(), p["tables"].as_str()) {
+            (_, Some("half")) => 2e-2,
+            (Some("fast"), _) => 1e-2,
+            _ => 1e-3,
+        };
+        assert!(number(&p["rms_error"]) <= number(&p["max_error"]) && number(&p["max_error"]) < promised, "{p}");
+        let lost = p["energy_lost"].as_array().expect("a list").clone();
+        let most = if p["layering"] == "min" { 0.5 } else { 0.05 };
+        assert!(lost.len() == 3 && lost.iter().all(|l| (-1e-3..most).contains(&number(l))), "{p}");
+        assert!(["eval", "sample", "setup"].iter().all(|k| number(&p["ns"][*k]) > 0.0), "{p}");
+        assert!(number(&p["bytes"]["bsdf"]) > 0.0 && number(&p["bytes"]["tables"]) > 0.0, "{p}");
+        // Nothing is closer than the reference, so it is never beaten.
+        assert!(!reference || p["front"] == true, "{p}");
+    }
+    let bytes = |tables: &str| {
+        let of = |p: &&Value| p["tier"] == "standard" && p["layering"] == "min" && p["tables"] == tables;
+        all.iter().find(of).and_then(|p| p["bytes"]["tables"].as_u64()).expect("a row")
+    };
+    assert!(bytes("half") < bytes("normal") && bytes("normal") < bytes("double"));
+    let svg = std::fs::read_to_string(here.join("t.svg")).expect("a picture");
+    assert!(svg.starts_with("<svg") && svg.matches("<circle").count() >= 21);
+    assert_eq!(status(&overcoat(here, &["tradeoff", &file, "--lobe", "diffuse"])), 2);
+    assert_eq!(status(&overcoat(here, &["tradeoff", &script(here, "bad.osl", "Ci = difuse(N);")])), 1);
+}

@@ -179,8 +179,8 @@ impl<S: Real> FacetTables<S> {
 }
 
 impl<S: Scalar> FacetTables<S> {
-    pub(super) fn in_double(&self) -> FacetTables<f64> {
-        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+    pub(super) fn cast<T: Scalar>(&self) -> FacetTables<T> {
+        let all = |values: &[S]| values.iter().map(|v| T::c(v.to_f64())).collect();
         FacetTables {
             missing: all(&self.missing),
             view: all(&self.view),
@@ -188,7 +188,7 @@ impl<S: Scalar> FacetTables<S> {
             means: all(&self.means),
             kind: match self.kind {
                 Rows::One => Rows::One,
-                Rows::Azimuth(roots) => Rows::Azimuth(roots.map(S::to_f64)),
+                Rows::Azimuth(roots) => Rows::Azimuth(roots.map(|r| T::c(r.to_f64()))),
                 Rows::Alpha => Rows::Alpha,
             },
             sheets: self.sheets,

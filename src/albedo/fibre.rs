@@ -134,8 +134,8 @@ impl<S> Default for FibreTables<S> {
 }
 
 impl<S: Scalar> FibreTables<S> {
-    pub(super) fn in_double(&self) -> FibreTables<f64> {
-        let all = |values: &[S]| values.iter().map(|v| v.to_f64()).collect();
+    pub(super) fn cast<T: Scalar>(&self) -> FibreTables<T> {
+        let all = |values: &[S]| values.iter().map(|v| T::c(v.to_f64())).collect();
         FibreTables {
             view: all(&self.view),
             bound: all(&self.bound),

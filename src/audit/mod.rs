@@ -6,14 +6,21 @@
 
 pub mod campaign;
 pub mod chi2;
+pub mod clock;
 pub mod cubature;
+#[cfg(feature = "cli")]
+pub mod double_double;
 pub mod estimate;
+#[cfg(feature = "cli")]
+pub mod extremes;
 pub mod furnace;
 mod gain;
 mod ledger;
+mod rounding;
 mod script;
 #[cfg(feature = "proptest")]
 pub mod strategy;
+pub mod tradeoff;
 pub mod trees;
 
 pub use campaign::{Campaign, Tally};
@@ -23,6 +30,7 @@ pub use estimate::{Estimate, estimate};
 pub use furnace::{Albedo, LobeShare, Side, albedo, albedo_until, breakdown};
 pub use gain::{Gain, assert_no_gain};
 pub use ledger::{LayerShare, Ledger, ledger};
+pub use rounding::rounding;
 pub use script::script;
 
 use crate::closure::Bsdf;

@@ -1,6 +1,7 @@
 //! `overcoat audit`: a campaign of random trees, in one piece or in shards.
 
-use super::{Failure, Global, Outcome, output};
+use super::output::{self, word as name};
+use super::{Failure, Global, Outcome};
 use crate::audit::campaign::{Campaign, Case, Found, LEVELS, Method, Tally, Verdict};
 use crate::audit::{Albedo, Side};
 use crate::closure::{Layering, LayeringRule, TintRule};
@@ -144,11 +145,6 @@ fn merge(files: &[PathBuf]) -> Result<Report, Failure> {
         return Err(Failure::usage(message));
     }
     Ok(whole)
-}
-
-/// A name as options and documents spell it.
-fn name(value: impl Debug) -> String {
-    format!("{value:?}").to_lowercase()
 }
 
 /// The one of `all` with this name.

@@ -1,7 +1,8 @@
 //! `overcoat cost`: what the material makes a renderer pay, as it is and before specialisation.
 
 use super::{Failure, Global, Outcome, output};
-use crate::closure::{ClosureTree, Eval};
+use crate::audit::clock::{self, nanoseconds};
+use crate::closure::ClosureTree;
 use crate::engine::Material;
 use crate::globals::Globals;
 use serde_json::{Value, json};
@@ -9,7 +10,6 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
 
 pub fn run(global: &Global, file: &Path) -> Outcome {
     let shader = global.shader(file)?;
@@ -39,27 +39,7 @@ pub(super) fn measure(material: &Material) -> Result<Value, Failure> {
     let setup = nanoseconds(|| {
         black_box(material.shade(black_box(&globals_at), black_box(wo)).is_ok());
     });
-    let directions: Vec<[f32; 3]> = (0..64)
-        .map(|k| {
-            let (z, phi) = ((k as f32 + 0.5) / 64.0, 2.399_963 * k as f32);
-            let r = (1.0 - z * z).sqrt();
-            [r * phi.cos(), r * phi.sin(), z]
-        })
-        .collect();
-    let mut next = 0;
-    let mut turn = || {
-        next = (next + 1) % directions.len();
-        directions[next]
-    };
-    let eval = nanoseconds(|| {
-        black_box(bsdf.eval(black_box(turn())));
-    });
-    let sample = nanoseconds(|| {
-        let [a, b, c] = turn();
-        black_box(bsdf.sample(black_box([a.abs(), b.abs(), c])));
-    });
-    let mut out = vec![Eval { f_cos: [0.0; 3], pdf: 0.0 }; directions.len()];
-    let batch = nanoseconds(|| bsdf.eval_batch(black_box(&directions), black_box(&mut out)));
+    let ((eval, sample), batch) = (clock::calls(&bsdf), clock::batch(&bsdf));
     let round = |x: f64| (x * 10.0).round() / 10.0;
     Ok(json!({
         "constant": program.is_constant(),
@@ -69,28 +49,9 @@ pub(super) fn measure(material: &Material) -> Result<Value, Failure> {
         "bake_ms": round(material.bake_time().as_secs_f64() * 1e3),
         "ns": {
             "shade": round(shade), "flatten": round((setup - shade).max(0.0)), "eval": round(eval),
-            "sample": round(sample), "eval_batch": round(batch / directions.len() as f64),
+            "sample": round(sample), "eval_batch": round(batch),
         },
     }))
-}
-
-/// Of one call: the fastest of several runs, each long enough for the clock.
-fn nanoseconds(mut call: impl FnMut()) -> f64 {
-    let mut calls = 16u32;
-    loop {
-        let start = Instant::now();
-        (0..calls).for_each(|_| call());
-        if start.elapsed().as_micros() > 500 {
-            break;
-        }
-        calls *= 2;
-    }
-    let run = |_| {
-        let start = Instant::now();
-        (0..calls).for_each(|_| call());
-        start.elapsed().as_secs_f64() * 1e9 / f64::from(calls)
-    };
-    (0..12).map(run).fold(f64::INFINITY, f64::min)
 }
 
 fn describe(cost: &Value, title: &str, text: &mut String) {

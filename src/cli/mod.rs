@@ -7,6 +7,7 @@ mod check;
 mod cost;
 mod eval;
 mod explain;
+mod extremes;
 mod furnace;
 mod gallery;
 mod host;
@@ -21,6 +22,7 @@ mod reproduce;
 mod sample;
 #[cfg(feature = "studio")]
 mod studio;
+mod tradeoff;
 mod tree;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -139,6 +141,9 @@ enum Command {
         /// The code.
         code: Option<String>,
     },
+    /// Every lobe at the ends of its parameters and angles: is any result infinite, undefined or negative, and how large
+    /// do rounding errors get?
+    Extremes(extremes::ExtremesArgs),
     /// Put the material in a white furnace: the albedo over a grid of directions, from both sides.
     Furnace(furnace::FurnaceArgs),
     /// Draw how the material scatters, where its energy goes, and how noisily it is sampled, as an SVG.
@@ -161,6 +166,8 @@ enum Command {
         #[arg(long, value_name = "DIR", conflicts_with_all = ["name", "header", "markdown"])]
         gallery: Option<PathBuf>,
     },
+    /// What speed costs in accuracy: tiers, layering rules and table sizes, timed and compared with the reference.
+    Tradeoff(tradeoff::TradeoffArgs),
     /// Make a picture of the material.
     Render(render::RenderArgs),
     /// Make the figures of the papers the lobes come from, with what they say and what was measured.
@@ -204,6 +211,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&cli.global, args),
         Command::Cost { file } => cost::run(&cli.global, file),
         Command::Explain { code } => explain::run(&cli.global, code.as_deref()),
+        Command::Extremes(args) => extremes::run(&cli.global, args),
         Command::Furnace(args) => furnace::run(&cli.global, args),
         Command::Gallery(args) => gallery::run(&cli.global, args),
         Command::Plot(args) => plot::run(&cli.global, args),
@@ -212,6 +220,7 @@ pub fn main() -> ExitCode {
         Command::Lobes { markdown: true, .. } => reference::markdown(),
         Command::Lobes { gallery: Some(folder), .. } => reference::gallery(&cli.global, folder),
         Command::Lobes { name, .. } => lobes::run(&cli.global, name.as_deref()),
+        Command::Tradeoff(args) => tradeoff::run(&cli.global, args),
         Command::Render(args) => render::run(&cli.global, args),
         Command::Reproduce(args) => reproduce::run(&cli.global, args),
         #[cfg(feature = "studio")]

@@ -2,6 +2,7 @@
 
 use super::{Failure, Outcome};
 use serde_json::{Number, Value};
+use std::fmt::Debug;
 use std::io::{ErrorKind, Write};
 
 /// Writes text to stdout; a reader that has gone away is not an error.
@@ -28,4 +29,9 @@ pub fn number(x: f32) -> Value {
 /// Numbers as an array.
 pub fn numbers(xs: &[f32]) -> Value {
     Value::Array(xs.iter().map(|x| number(*x)).collect())
+}
+
+/// A variant as words on the command line name it: in lower case.
+pub fn word(value: impl Debug) -> String {
+    format!("{value:?}").to_lowercase()
 }

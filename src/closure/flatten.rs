@@ -66,8 +66,13 @@ impl<S: Scalar> Curves<S> {
 
     /// The same tables in double precision.
     pub fn in_double(&self) -> Curves<f64> {
+        self.cast()
+    }
+
+    /// The same tables in another type, rounded to double precision.
+    pub fn cast<T: Scalar>(&self) -> Curves<T> {
         Curves {
-            baked: self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.in_double()))).collect(),
+            baked: self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect(),
             sites: self.sites.clone(),
             none: AlbedoCurve::default(),
         }

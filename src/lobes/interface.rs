@@ -322,7 +322,9 @@ impl<S: Real> Interface<S> {
         let crossing = L::select(near, L::lift(self.crossing[0]), L::lift(self.crossing[1]));
         std::array::from_fn(|c| {
             let (back, on) = (missing.mul_add(L::one() - crossing, back[c]), missing.mul_add(crossing, on[c]));
-            let sum = L::lift(self.reflected[c]).mul_add(back, L::lift(self.refracted[c]) * on).min(L::one());
+            let sum = L::lift(self.reflected[c]).mul_add(back, L::lift(self.refracted[c]) * on);
+            // A part that is next to nothing may have been integrated to less.
+            let sum = sum.clamp(L::zero(), L::one());
             L::select(w.z.abs().gt(L::zero()), sum, L::zero())
         })
     }

@@ -40,10 +40,10 @@ pub struct OrenNayar<S> {
 
 impl<S: Real> OrenNayar<S> {
     /// The published lobe's albedo at `cos` > 0: A + B/π·[sin θ(θ − sin θ cos θ) + ⅔·tan θ(1 − sin³ θ)], written so
-    /// that nothing cancels at grazing angles.
-    fn raw_albedo<L: Real + Lift<S>>(&self, cos: L) -> L {
-        let cos = cos.clamp(L::zero(), L::one());
-        let sin = (L::one() - cos.sq()).safe_sqrt();
+    /// that nothing cancels at grazing angles; next to the normal the sine has digits that the cosine has lost.
+    fn raw_albedo<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
+        let cos = w.z.clamp(L::zero(), L::one());
+        let sin = w.x.mul_add(w.x, w.y.sq()).sqrt().min(L::one());
         let theta = sin.atan2(cos);
         let near = sin * (theta - sin * cos);
         let far = L::c(2.0 / 3.0) * sin * cos * (L::one() + sin + sin.sq()) / (L::one() + sin);
@@ -94,7 +94,7 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
             excess: S::one(),
             scale: Self::on_side(wo.z, S::c(FRAC_1_PI)),
         };
-        OrenNayar { excess: lobe.raw_albedo(wo.z).max(S::one()), ..lobe }
+        OrenNayar { excess: lobe.raw_albedo(wo).max(S::one()), ..lobe }
     }
 
     #[inline(always)]
@@ -103,7 +103,7 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         // sin θi·sin θo·cos Δφ over the larger cosine is sin α·tan β·cos Δφ.
         let across = (wo.x * wi.x + wo.y * wi.y).max(L::zero());
         let retro = across / wo.z.max(wi.z).max(L::c(1e-6));
-        let excess = self.raw_albedo(wi.z).max(L::lift(self.excess));
+        let excess = self.raw_albedo(wi).max(L::lift(self.excess));
         let f = L::lift(self.scale) * L::lift(self.b).mul_add(retro, L::lift(self.a)) / excess;
         [Self::on_side(wi.z, f); 3]
     }
@@ -117,10 +117,10 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
     }
 
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
-        [Self::on_side(w.z, self.raw_albedo(w.z).min(S::one())); 3]
+        [Self::on_side(w.z, self.raw_albedo(w).min(S::one())); 3]
     }
 
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
-        [Self::on_side(w.z, self.raw_albedo(w.z).min(L::one())); 3]
+        [Self::on_side(w.z, self.raw_albedo(w).min(L::one())); 3]
     }
 }

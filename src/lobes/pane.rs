@@ -193,7 +193,8 @@ impl<S: Real> Pane<S> {
         let back = missing.mul_add(L::lift(self.shared), back);
         let on = missing.mul_add(L::one() - L::lift(self.shared), on);
         std::array::from_fn(|c| {
-            let sum = L::lift(self.tints[0][c]).mul_add(back, L::lift(self.tints[1][c]) * on).min(L::one());
+            let sum = L::lift(self.tints[0][c]).mul_add(back, L::lift(self.tints[1][c]) * on);
+            let sum = sum.clamp(L::zero(), L::one());
             L::select(w.z.gt(L::zero()), sum, L::zero())
         })
     }

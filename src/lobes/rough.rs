@@ -258,7 +258,8 @@ impl<S: Real> Reflector<S> {
         std::array::from_fn(|c| {
             // Without parts: all that is not missing, which no reflectance exceeds.
             let single = if white || !tables.has_parts() { L::one() - missing } else { parts[c] };
-            let sum = missing.mul_add(L::lift(self.kept[c]), single).min(L::one());
+            // A part that is next to nothing may have been rounded below it.
+            let sum = missing.mul_add(L::lift(self.kept[c]), single).clamp(L::zero(), L::one());
             L::select(w.z.gt(L::zero()), sum, L::zero())
         })
     }

@@ -30,8 +30,8 @@ pub fn conductor<L: Real>(n: L, k: L, c: L) -> L {
     let c = c.clamp(L::zero(), L::one());
     let (c2, n2, k2) = (c * c, n * n, k * k);
     let s2 = L::one() - c2;
-    // a² + b² = |N² − sin²|, a the real part of its root.
-    let real = n2 - k2 - s2;
+    // a² + b² = |N² − sin²|, a the real part of its root. Not n² − k² − sin²: next to n = 1 that leaves nothing of c².
+    let real = (n - L::one()).mul_add(n + L::one(), c2) - k2;
     let product = L::c(4.0) * n2 * k2;
     let modulus = real.mul_add(real, product).safe_sqrt();
     let half = L::c(0.5);

@@ -1,9 +1,10 @@
-//! Curves as SVG pictures.
+//! Curves and points as SVG pictures.
 //!
 //! In: named series of points. Out: the text of an SVG file. Drawn by plotters with its SVG backend only; the text is
 //! left to the viewer's fonts.
 
 use plotters::prelude::*;
+use std::ops::Range;
 
 /// What a plot shows and how.
 pub struct Plot<'a> {
@@ -129,9 +130,90 @@ impl Plot<'_> {
     }
 }
 
+/// Points on two logarithmic axes.
+pub struct Scatter<'a> {
+    /// Stands above the picture.
+    pub title: &'a str,
+    /// What runs along the horizontal axis, with its unit.
+    pub x: &'a str,
+    /// What runs along the vertical axis, with its unit.
+    pub y: &'a str,
+    /// Name and points of every group.
+    pub groups: &'a [(String, Vec<(f64, f64)>)],
+    /// Drawn in gray behind the points.
+    pub lines: &'a [Vec<(f64, f64)>],
+}
+
+impl Scatter<'_> {
+    /// The picture, 900 × 560.
+    ///
+    /// # Errors
+    /// If there is no point that a logarithm exists of.
+    pub fn svg(&self) -> Result<String, String> {
+        let points = || self.groups.iter().flat_map(|g| &g.1).filter(|p| shown(p));
+        if points().next().is_none() {
+            return Err(format!("{}: nothing to plot", self.title));
+        }
+        let range = |f: fn(&(f64, f64)) -> f64| {
+            let (lo, hi) = points().map(f).fold((f64::INFINITY, 0.0f64), |(lo, hi), x| (lo.min(x), hi.max(x)));
+            lo / 1.5..hi * 1.5
+        };
+        let mut text = String::new();
+        self.draw(&mut text, range(|p| p.0), range(|p| p.1)).map_err(|e| e.to_string())?;
+        Ok(text)
+    }
+
+    fn draw(&self, text: &mut String, x: Range<f64>, y: Range<f64>) -> Result<(), Box<dyn std::error::Error>> {
+        let area = SVGBackend::with_string(text, (900, 560)).into_drawing_area();
+        area.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&area)
+            .caption(self.title, ("sans-serif", 18))
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(72)
+            .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+        let power = |y: &f64| format!("{y:.0e}");
+        let mut mesh = chart.configure_mesh();
+        mesh.light_line_style(WHITE).x_desc(self.x).y_desc(self.y).y_label_formatter(&power).draw()?;
+        for line in self.lines {
+            chart.draw_series(LineSeries::new(line.iter().copied().filter(shown), BLACK.mix(0.25)))?;
+        }
+        for (index, (name, points)) in self.groups.iter().enumerate() {
+            let color = COLORS[index % COLORS.len()];
+            let shown = points.iter().copied().filter(shown);
+            chart
+                .draw_series(shown.map(|p| Circle::new(p, 3, color.filled())))?
+                .label(name.as_str())
+                .legend(move |(x, y)| Circle::new((x + 9, y), 3, color.filled()));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.85))
+            .border_style(BLACK.mix(0.3))
+            .draw()?;
+        area.present()?;
+        Ok(())
+    }
+}
+
+/// Whether a point has a place on logarithmic axes.
+fn shown(p: &(f64, f64)) -> bool {
+    [p.0, p.1].iter().all(|x| x.is_finite() && *x > 0.0)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Plot;
+    use super::{Plot, Scatter};
+
+    #[test]
+    fn points_become_a_picture() {
+        let groups = [("a".to_owned(), vec![(1.0, 1e-3), (10.0, f64::NAN), (30.0, 1e-6), (2.0, 0.0)])];
+        let plot = Scatter { title: "T", x: "x", y: "y", groups: &groups, lines: &[vec![(1.0, 1e-3), (30.0, 1e-6)]] };
+        let svg = plot.svg().expect("a picture");
+        assert!(svg.matches("<circle").count() == 3 && svg.contains("polyline") && !svg.contains("NaN"));
+        assert!(Scatter { groups: &[], ..plot }.svg().is_err());
+    }
 
     #[test]
     fn curves_become_a_picture() {

@@ -69,15 +69,7 @@ pub fn turned(cos: f64) -> [f32; 3] {
 /// How much `f`, in double precision, may change where rounding in single precision moves every component of both directions
 /// by one unit in the last place: an error that no way of computing in single precision avoids.
 pub fn rounding(f: impl Fn([f64; 3], [f64; 3]) -> f64, a: [f64; 3], b: [f64; 3]) -> f64 {
-    let truth = f(a, b);
-    let moved = |i: usize, by: f64| {
-        let (mut a, mut b) = (a, b);
-        let w = if i < 3 { &mut a } else { &mut b };
-        w[i % 3] += by;
-        (f(a, b) - truth).abs()
-    };
-    let step = f64::from(f32::EPSILON);
-    (0..6).map(|i| moved(i, step).max(moved(i, -step))).sum()
+    overcoat::audit::rounding(f64::from(f32::EPSILON), f, a, b)
 }
 
 /// One lobe on its own, with N = +z and T = +x where it takes them.

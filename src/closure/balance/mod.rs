@@ -110,6 +110,11 @@ impl<S: Scalar> Balance<S> {
         self.scales.iter().map(Scales::bytes).sum()
     }
 
+    /// The same tables in another type, rounded to double precision.
+    pub fn cast<T: Scalar>(&self) -> Balance<T> {
+        Balance { scales: self.scales.iter().map(Scales::cast).collect(), plan: self.plan.clone(), tint: self.tint }
+    }
+
     /// For a tree that is the same everywhere: what became of each lobe, in the order they are met, tops first. Empty
     /// for other materials.
     pub fn fates(&self) -> Vec<(LobeKind, Fate)> {

@@ -72,6 +72,13 @@ impl<S: Scalar> Scales<S> {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
+    pub fn cast<T: Scalar>(&self) -> Scales<T> {
+        let &Scales { nodes, weights, params, channels, .. } = self;
+        let values = self.values.iter().map(|v| T::c(v.to_f64())).collect();
+        let [lo, inv_range] = [self.lo, self.inv_range].map(|x| T::c(x.to_f64()));
+        Scales { values, nodes, weights, params, channels, lo, inv_range }
+    }
+
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.values)
     }
