@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes every picture of the README and of docs/studio.md again. Needs a release build's time, and for the page
+# Makes the pictures of docs/studio.md again, and those that begin the README. Needs a release build's time, and for the page
 # chromium, chromium-driver and selenium (`pip install selenium`).
 set -eu
 cd "$(dirname "$0")/.."

@@ -139,6 +139,12 @@ export class Viewer {
     this.on.pinned(null);
   }
 
+  fix(at) {
+    this.at = at;
+    this.place();
+    this.on.pinned(at);
+  }
+
   spot(event) {
     const box = this.root.getBoundingClientRect();
     return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
@@ -163,11 +169,7 @@ export class Viewer {
       else if (drag.moved > 3) this.turn(-x * 0.008, y * 0.008);
     });
     this.root.addEventListener("pointerup", (event) => {
-      if (drag && drag.moved <= 3 && !drag.split) {
-        this.at = this.spot(event);
-        this.place();
-        this.on.pinned(this.at);
-      }
+      if (drag && drag.moved <= 3 && !drag.split) this.fix(this.spot(event));
       drag = null;
     });
     this.root.addEventListener("pointerleave", () => this.on.pointed(null));
@@ -192,6 +194,7 @@ export class Viewer {
     else if (event.key === "+" || event.key === "=") this.zoom(0.9);
     else if (event.key === "-") this.zoom(1.1);
     else if (event.key === "Home") this.home();
+    else if (event.key === "Enter") this.fix([0.5, 0.5]);
     else if (event.key === "Escape") this.unpin();
     else return;
     event.preventDefault();
