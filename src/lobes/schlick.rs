@@ -94,8 +94,11 @@ fn known<const N: usize>(values: &[Option<f32>], at: usize, param: usize) -> Opt
     Some(color)
 }
 
-/// f0, and the reflectance with its key, if they are known.
-fn law(values: &[Option<f32>]) -> Option<([f32; 3], fn(&FacetKey, f64) -> [f64; 3], FacetKey)> {
+/// f0, and the reflectance with its key.
+type Law = ([f32; 3], fn(&FacetKey, f64) -> [f64; 3], FacetKey);
+
+/// If they are known.
+fn law(values: &[Option<f32>]) -> Option<Law> {
     let f0 = known::<3>(values, 14, 6)?;
     let [thickness] = known(values, 22, 10)?;
     if thickness > 0.0 {
