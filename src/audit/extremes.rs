@@ -114,7 +114,7 @@ pub struct Row {
     pub compared: u64,
     /// |f − truth|.
     pub error: Worst,
-    /// |f − truth| less what [`rounding`] of the directions makes of it, of the largest errors.
+    /// |f − truth| less what [`rounding`] of both directions makes of it, of the largest errors.
     pub beyond: Worst,
 }
 
@@ -280,7 +280,8 @@ impl Row {
             }
             let [a, b] = [c.pair.wo, c.pair.wi].map(|w| w.map(|x| T::c(S::c(x).to_f64())));
             let unavoidable = rounding(step, |a, b| truth.f(a, b)[c.channel], a, b);
-            let left = (c.error - unavoidable) / c.bright;
+            // Both directions are rounded.
+            let left = (c.error - 2.0 * unavoidable) / c.bright;
             self.beyond.raise(left, || block.place("f", c.pair, c.found, c.truth));
         }
     }

@@ -48,13 +48,13 @@ impl<L: Real> Complex<L> {
 #[inline(always)]
 pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
     let c = c.clamp(L::c(1e-6), L::one());
-    let s2 = L::one() - c * c;
     let n2 = film.ior.max(L::one());
     // cos²θ₂ without the difference 1 − sin²θ/n₂², which leaves nothing of a grazing cosine where n₂ is 1.
     let c2 = c.mul_add(c, (n2 - L::one()) * (n2 + L::one())).safe_sqrt() / n2;
     // q = N·cos θ₃ = √(N² − sin²θ), its parts without the difference that cancels.
     let square = Complex(n * n - k * k, L::c(2.0) * n * k);
-    let real = square.0 - s2;
+    // As in `fresnel::conductor`: c² is not lost where n is next to 1.
+    let real = (n - L::one()).mul_add(n + L::one(), c * c) - k * k;
     let modulus = real.mul_add(real, square.1.sq()).safe_sqrt();
     let large = L::c(0.5) * (modulus + real.abs());
     let small = L::c(0.25) * square.1.sq() / large.max(L::c(1e-30));
