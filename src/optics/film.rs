@@ -62,9 +62,14 @@ pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
     let q = Complex(L::select(up, large, small).safe_sqrt(), L::select(up, small, large).safe_sqrt());
     let outer = [(c - n2 * c2) / (c + n2 * c2), (c2 - n2 * c) / (c2 + n2 * c)];
     let (a, b) = (n2 * c2, Complex(q.0 * n2, q.1 * n2));
-    let inner_s = Complex(a - q.0, -q.1).over(q.plus(a));
-    let inside = Complex(square.0 * c2, square.1 * c2);
-    let inner_p = Complex(b.0 - inside.0, b.1 - inside.1).over(Complex(b.0 + inside.0, b.1 + inside.1));
+    // The differences a − q and n₂·q − N²·cos θ₂ as those of squares over the sums: nothing cancels where N is next to n₂.
+    let lack = Complex((n2 - n).mul_add(n2 + n, k * k), -square.1);
+    let sum_s = q.plus(a);
+    let inner_s = lack.over(sum_s.times(sum_s));
+    let sum_p = Complex(b.0 + square.0 * c2, b.1 + square.1 * c2);
+    let t2 = (L::one() - c) * (L::one() + c) / (n2 * n2);
+    let turn = Complex(square.0.mul_add(L::one() - t2, -(t2 * n2 * n2)), square.1 * (L::one() - t2));
+    let inner_p = lack.times(turn).over(sum_p.times(sum_p));
     let path = L::c(2.0) * n2 * film.thickness * c2;
     let mut sum = L::zero();
     for (ratio, weight) in BAND {
