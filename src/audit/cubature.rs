@@ -57,7 +57,19 @@ impl Patch {
 
     /// What its points stand for, if almost nothing of that was found: light that lies between the places looked at.
     fn missed(&self, found: [f64; 3]) -> f64 {
-        let told: f64 = self.points.iter().map(|p| p.1).sum();
+        self.untold(found, self.points.iter().map(|p| p.1).sum())
+    }
+
+    /// [`missed`](Self::missed) where a point stands for no more than its brightness over the whole cell: most of what a
+    /// broad lobe's point stands for lies elsewhere.
+    fn missed_of(&self, found: [f64; 3], mut f: impl FnMut(f64, f64) -> [f64; 3]) -> f64 {
+        let area = self.width(0) * self.width(1);
+        let here = |(p, share): &([f64; 2], f64)| share.min(area * f(p[0], p[1]).into_iter().fold(0.0, f64::max));
+        let told = self.points.iter().map(here).sum();
+        self.untold(found, told)
+    }
+
+    fn untold(&self, found: [f64; 3], told: f64) -> f64 {
         let found = found[0].max(found[1]).max(found[2]);
         let wide = self.width(0).max(self.width(1)) > SEEN;
         if found < 0.01 * told && wide { told } else { 0.0 }
@@ -225,7 +237,10 @@ impl Cell {
         let value = sums[0].map(|s| s * area);
         let gap = |other: [f64; 3]| (0..3).map(|c| (sums[0][c] - other[c]).abs()).fold(0.0, f64::max) * area;
         let (ex, ey) = (gap(sums[1]), gap(sums[2]));
-        let missed = patch.missed(value);
+        let missed = match patch.missed(value) {
+            told if told > 0.0 => patch.missed_of(value, |x, y| f(which, x, y)),
+            none => none,
+        };
         let axis = if missed > 0.0 { patch.narrow() } else { usize::from(ey > ex) };
         let error = if value.iter().all(|v| v.is_finite()) { ex + ey + missed } else { f64::INFINITY };
         Cell { which, patch, value, error, axis }

@@ -184,7 +184,20 @@ pub(super) const FORMS: &[Form] = &[
         SCHLICK,
         Build::Lobe {
             kind: LobeKind::GeneralizedSchlick,
-            args: &[Param(0), Param(1), WHITE, BLACK, Param(2), Param(3), Param(4), Param(5), Const(&[5.0]), Param(7)],
+            args: &[
+                Param(0),
+                Param(1),
+                WHITE,
+                BLACK,
+                Param(2),
+                Param(3),
+                Param(4),
+                Param(5),
+                Const(&[5.0]),
+                Param(7),
+                ZERO,
+                Const(&[1.5]),
+            ],
         },
     )
     .noted("between f0 and f90 it follows Schlick's curve, not that of the index"),

@@ -21,6 +21,7 @@
 use super::rough::{Reflectance, even, largest, split};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
+use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
 use crate::optics::{Lift, Real, V3, fresnel, sampling};
 use std::f64::consts::FRAC_1_PI;
@@ -152,7 +153,21 @@ impl<S: Real> Interface<S> {
                 [c_out, c_in, self.eta * self.eta * cross.iter().map(|c| c * c).sum::<f64>()]
             });
             let cos = c_out / length2.sqrt();
-            let rest = law.rest(cos, sine2 / (length2 * (L::one() + cos.max(L::zero()))));
+            let rest = match law {
+                Reflectance::Coated(n, _, film) => {
+                    let [n0, n1, n2, thickness, ior] = [n[0], n[1], n[2], film.thickness, film.ior].map(L::lift);
+                    let all = [out.x, out.y, out.z, inn.x, inn.y, inn.z, n0, n1, n2, thickness, ior];
+                    // The cosine too: what passes has a root's slope next to the critical angle.
+                    L::by_lane(all, |v| {
+                        let h: [f64; 3] = std::array::from_fn(|i| sign * (self.eta * v[3 + i] + v[i]));
+                        let dot = |a: &[f64]| a.iter().zip(&h).map(|(a, h)| a * h).sum::<f64>();
+                        let cos = dot(&v[..3]) / dot(&h).max(1e-300).sqrt();
+                        let film = Film { thickness: v[9], ior: v[10] };
+                        std::array::from_fn(|i| film::passed(film, v[6 + i], cos, i))
+                    })
+                }
+                _ => law.rest(cos, sine2 / (length2 * (L::one() + cos.max(L::zero())))),
+            };
             return (h, jacobian(c_out, c_in), rest.map(|r| L::select(met(c_out, c_in), r, L::zero())));
         }
         let (c_out, c_in) = (out.dot(h), -inn.dot(h));

@@ -102,8 +102,13 @@ impl<S: Real> Reflectance<S> {
                 std::array::from_fn(|i| fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c))
             }
             Reflectance::Coated(n, k, film) => {
-                let film = Film { thickness: L::lift(film.thickness), ior: L::lift(film.ior) };
-                std::array::from_fn(|i| film::metal(film, L::lift(n[i]), L::lift(k[i]), c, i))
+                // Phases of many turns, and roots next to the critical angle: in double precision.
+                let values = [n[0], n[1], n[2], k[0], k[1], k[2], film.thickness, film.ior].map(L::lift);
+                let [n0, n1, n2, k0, k1, k2, thickness, ior] = values;
+                L::by_lane([n0, n1, n2, k0, k1, k2, thickness, ior, c], |v| {
+                    let film = Film { thickness: v[6], ior: v[7] };
+                    std::array::from_fn(|i| film::metal(film, v[i], v[3 + i], v[8], i))
+                })
             }
             Reflectance::Schlick(f0, f90, exponent) => {
                 let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
@@ -112,18 +117,10 @@ impl<S: Real> Reflectance<S> {
         }
     }
 
-    /// 1 − F of what transmits, with all its digits where F is close to 1.
+    /// 1 − F, of Schlick's curve with all its digits where F is close to 1.
     #[inline(always)]
     pub(super) fn rest<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
-        let (f0, f90, exponent) = match self {
-            Reflectance::Schlick(f0, f90, exponent) => (f0, f90, exponent),
-            // Of glass; a metal's rest goes nowhere.
-            Reflectance::Coated(n, _, film) => {
-                let film = Film { thickness: L::lift(film.thickness), ior: L::lift(film.ior) };
-                return std::array::from_fn(|i| film::passed(film, L::lift(n[i]), c, i));
-            }
-            _ => return self.at(c, fall).map(|f| L::one() - f),
-        };
+        let Reflectance::Schlick(f0, f90, exponent) = self else { return self.at(c, fall).map(|f| L::one() - f) };
         let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
         std::array::from_fn(|i| {
             let (f0, f90) = (L::lift(f0[i]), L::lift(f90[i]));

@@ -73,7 +73,7 @@ pub fn metal<L: Real>(film: Film<L>, n: L, k: L, c: L, channel: usize) -> L {
     let path = L::c(2.0) * n2 * film.thickness * c2;
     let mut sum = L::zero();
     for (ratio, weight) in BAND {
-        let (sin, cos) = turn(path, ratio, channel);
+        let (sin, cos) = phase(path, ratio, channel);
         for (outer, inner) in outer.into_iter().zip([inner_s, inner_p]) {
             let back = inner.times(Complex(cos, sin));
             let under = Complex(back.0 * outer, back.1 * outer).plus(L::one());
@@ -99,7 +99,7 @@ pub fn passed<L: Real>(film: Film<L>, n: L, c: L, channel: usize) -> L {
     let path = L::c(2.0) * a * film.thickness;
     let mut sum = L::zero();
     for (ratio, weight) in BAND {
-        let cos = turn(path, ratio, channel).1;
+        let cos = phase(path, ratio, channel).1;
         for (x, y, u, v) in faces {
             let (straight, back) = ((x + y) * (u + v), (x - y) * (u - v));
             let all = straight.mul_add(straight, back * back) + L::c(2.0) * straight * back * cos;
@@ -112,7 +112,7 @@ pub fn passed<L: Real>(film: Film<L>, n: L, c: L, channel: usize) -> L {
 /// Sine and cosine of the phase that one way to the far face and back adds, for the wavelength at `ratio` of a channel's own;
 /// `path` is its optical length in nanometres.
 #[inline(always)]
-fn turn<L: Real>(path: L, ratio: f64, channel: usize) -> (L, L) {
+fn phase<L: Real>(path: L, ratio: f64, channel: usize) -> (L, L) {
     let turns = path * L::c(1.0 / (ratio * WAVELENGTHS[channel]));
     ((turns - turns.floor()) * L::c(TAU)).sin_cos()
 }
