@@ -18,7 +18,7 @@
 //!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
-use super::rough::{Reflectance, even, largest, split};
+use super::rough::{Reflectance, chance, even, largest, split};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
@@ -245,8 +245,7 @@ impl<S: Real> Interface<S> {
     /// Probability of reflecting at a facet with reflectance `f`.
     #[inline(always)]
     fn chance<L: Real + Lift<S>>(&self, f: L) -> L {
-        let (back, on) = (f * L::lift(self.odds[0]), (L::one() - f) * L::lift(self.odds[1]));
-        L::select((back + on).gt(L::zero()), back / (back + on).max(L::c(1e-30)), L::zero())
+        chance(f, self.odds.map(L::lift))
     }
 
     #[inline(always)]

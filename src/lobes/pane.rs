@@ -8,7 +8,7 @@
 //! folded directions: together the white surface of `lobes::rough`, whose second bounces are split likewise. Reflection
 //! and transmission sum to E + M from either side, and both sides look the same.
 
-use super::rough::{largest, split, widths};
+use super::rough::{chance, largest, split, widths};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
 use crate::optics::microfacet::{Facets, Shape, mirror};
@@ -130,8 +130,7 @@ impl<S: Real> Pane<S> {
     /// Probability of reflecting at a facet with reflectance `r`.
     #[inline(always)]
     fn chance<L: Real + Lift<S>>(&self, r: L) -> L {
-        let (back, on) = (r * L::lift(self.odds[0]), (L::one() - r) * L::lift(self.odds[1]));
-        L::select((back + on).gt(L::zero()), back / (back + on).max(L::c(1e-30)), L::zero())
+        chance(r, self.odds.map(L::lift))
     }
 
     #[inline(always)]

@@ -63,6 +63,13 @@ pub(super) fn split<S: Real>(u: S, p: S) -> (S::Mask, S) {
     (first, S::select(first, below, above).clamp(S::zero(), S::c(0.999_999_94)))
 }
 
+/// Probability of reflecting, not passing, at a facet with reflectance `f` where tints weigh the two with `odds`.
+#[inline(always)]
+pub(super) fn chance<L: Real>(f: L, odds: [L; 2]) -> L {
+    let (back, on) = (f * odds[0], (L::one() - f) * odds[1]);
+    L::select((back + on).gt(L::zero()), back / (back + on).max(L::c(1e-30)), L::zero())
+}
+
 /// The largest channel.
 pub(super) fn largest<S: Real>(color: Rgb<S>) -> S {
     color[0].max(color[1]).max(color[2])
