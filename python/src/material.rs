@@ -237,7 +237,8 @@ impl Material {
         seed: u64,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let scenes = [("sphere", Scene::Sphere), ("ball", Scene::Ball), ("drape", Scene::Drape), ("furnace", Scene::Furnace)];
+        let scenes =
+            [("sphere", Scene::Sphere), ("ball", Scene::Ball), ("drape", Scene::Drape), ("furnace", Scene::Furnace)];
         let scene = choose("scene", scene, &scenes)?;
         let settings =
             RenderSettings { scene, spp, width: size, height: size, seed, threads, ..RenderSettings::default() };
