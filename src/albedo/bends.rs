@@ -15,7 +15,7 @@ pub(super) struct Bend {
 /// nodes themselves, which buys twice the nodes along each side instead.
 ///
 /// With D = 2f(k) − f(k−1) − f(k+1), a smooth f rises D/8 above the line between two nodes, and one with a kink, as at
-/// a tangent's horizon, at most half the larger D at the two.
+/// a tangent's horizon, at most half the larger D at the two: six tenths here, because what bends may also be rounded off.
 pub(super) fn bends(albedos: &[[f64; COMPONENTS]], rows: usize, nodes: usize) -> Vec<Bend> {
     let difference = |k: usize, c: usize| {
         let (row, node) = (k / nodes % rows, k % nodes);
@@ -32,7 +32,7 @@ pub(super) fn bends(albedos: &[[f64; COMPONENTS]], rows: usize, nodes: usize) ->
         for r in row.saturating_sub(1)..=(row + 1).min(rows - 1) {
             for n in node.saturating_sub(1)..=(node + 1).min(nodes - 1) {
                 let there = all[(sheet * rows + r) * nodes + n];
-                low = std::array::from_fn(|c| low[c].max(0.5 * (there[c][0].max(0.0) + there[c][1].max(0.0))));
+                low = std::array::from_fn(|c| low[c].max(0.6 * (there[c][0].max(0.0) + there[c][1].max(0.0))));
             }
         }
         Bend { low, middle: all[k].map(|d| (d[0] + d[1]) / 16.0) }

@@ -21,6 +21,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub const COMPONENTS: usize = 3;
 /// Most offsets of a family of threads.
 pub const OFFSETS: usize = 5;
+/// Below this cosine a cloth is taken to be as it is here: its f is a quotient of small numbers at its horizons, and its
+/// tables have to end somewhere.
+pub const HORIZON: f64 = 1e-5;
 /// The parameters of a lobe that its tables depend on.
 pub type FibreKey = [f64; 16];
 /// The components of f(ωo, ωi) for many ωi: `(key, ωo, ωi, out)`.
@@ -224,9 +227,14 @@ impl<S: Real> FibreTables<S> {
         } else {
             (across * inv).sqrt()
         };
-        let (i, s) = cell(place, self.nodes);
         let row = if self.axis.is_some() { t } else { (z / (z + w.y.abs()).max(tiny)).sqrt() };
-        let (j, r) = cell(row, self.rows);
+        let (place, row) = if self.crossed {
+            let from = |x: L, first: f64| (x - L::c(first)) * L::c(1.0 / (1.0 - first));
+            (from(place, first_place()), from(row, HORIZON.sqrt()))
+        } else {
+            (place, row)
+        };
+        let ((i, s), (j, r)) = (cell(place, self.nodes), cell(row, self.rows));
         let sheet = if self.sheets == 2 {
             L::select(w.x.lt(L::zero()), L::c((self.rows * self.nodes) as f64), L::zero())
         } else {
@@ -260,17 +268,22 @@ impl FibreSpec {
     pub fn bake<S: Scalar>(&self, precision: Precision) -> FibreTables<S> {
         let scaled = |count: usize| (count as f64 * self.detail) as usize;
         let size = scaled(precision.cos_nodes);
-        let precision = Precision { polar: scaled(precision.polar), ..precision };
+        let rule = match self.weave {
+            // Fewer points lose a hundredth between its ridges and its horizons.
+            Some(_) if precision.polar < Precision::STANDARD.polar => Precision::STANDARD,
+            _ => precision,
+        };
+        let rule = FibreQuadrature::new(Precision { polar: scaled(rule.polar), ..rule });
         let (rows, nodes) = match (self.axis, self.weave) {
             // Every quadrature becomes a node; see `bends`.
-            (None, Some(_)) => ((size * 47 / 100).clamp(14, 80), (size * 47 / 100).clamp(14, 80)),
+            (None, Some(_)) => ((size * 47 / 100).clamp(22, 80), (size * 47 / 100).clamp(22, 80)),
             (None, None) if self.around => ((size / 10).clamp(8, 28), (size / 4).clamp(14, 64)),
             (None, None) => (1, size),
             (Some(_), _) if self.around => ((precision.axis_nodes / 2).max(8), (size / 6).clamp(14, 64)),
             (Some(_), _) => (precision.axis_nodes, (size / 6).clamp(14, 64)),
         };
         let sheets = if self.mirrored { 1 } else { 2 };
-        let grid = Grid { spec: self, rule: FibreQuadrature::new(precision), rows, nodes };
+        let grid = Grid { spec: self, rule, rows, nodes };
 
         let plane = rows * nodes;
         let places: Vec<usize> = (0..sheets * plane).collect();
@@ -312,20 +325,28 @@ impl FibreSpec {
 }
 
 /// Where the fractions `row` and `place` along a node's row lie: square roots of diamond angles, for crossed threads
-/// from both ends.
+/// from both ends and from [`HORIZON`] on.
 fn direction(sheet: usize, row: f64, place: f64, crossed: bool) -> V3<f64> {
-    // A cloth's f is a quotient of small numbers at its horizons, and has to stay away from their limits.
-    let (along, least) = match crossed {
-        true if place < 0.5 => ((2.0 * place * place).max(1e-5), 1e-5),
-        true => (1.0 - 2.0 * (1.0 - place).powi(2), 1e-5),
-        false => (place.powi(2).max(1e-9), 1e-12),
+    let (along, around) = if crossed {
+        let place = first_place() + place * (1.0 - first_place());
+        let row = HORIZON.sqrt() + row * (1.0 - HORIZON.sqrt());
+        (if place < 0.5 { 2.0 * place * place } else { 1.0 - 2.0 * (1.0 - place).powi(2) }, row.powi(2))
+    } else {
+        (place.powi(2).max(1e-9), row.powi(2).max(1e-12))
     };
     let unit = |a: f64, b: f64| (a / a.hypot(b), b / a.hypot(b));
     let (cos, sin) = unit(along, 1.0 - along);
-    let around = row.powi(2);
-    let (z, y) = unit(around.max(least), 1.0 - around);
+    let (z, y) = unit(around, 1.0 - around);
     V3::new(if sheet == 0 { sin } else { -sin }, cos * y, cos * z)
 }
+
+/// Where [`HORIZON`] lies along the first half of a row of crossed threads.
+fn first_place() -> f64 {
+    (0.5 * HORIZON).sqrt()
+}
+
+/// Where outermost cells are probed.
+const EDGE: [f64; 5] = [0.02, 0.06, 0.16, 0.36, 0.66];
 
 /// The nodes of a table and how to integrate there; fractional indices lie between nodes.
 struct Grid<'s> {
@@ -349,6 +370,14 @@ impl Grid<'_> {
         direction(sheet, around, node / (self.nodes - 1) as f64, self.spec.weave.is_some())
     }
 
+    /// The row on which the cosine is [`HORIZON`], in a cloth's table.
+    fn row_of_horizon(&self, sheet: usize, node: f64) -> f64 {
+        let on_top = self.direction(sheet, (self.rows - 1) as f64, node);
+        let y = (on_top.z * on_top.z - HORIZON * HORIZON).max(0.0).sqrt();
+        let first = HORIZON.sqrt();
+        ((HORIZON / (HORIZON + y)).sqrt() - first) / (1.0 - first) * (self.rows - 1) as f64
+    }
+
     fn albedos(&self, sheet: usize, row: f64, node: f64) -> [f64; COMPONENTS] {
         let w = self.direction(sheet, row, node);
         let Some(axis) = self.spec.axis else {
@@ -368,11 +397,13 @@ impl Grid<'_> {
     }
 
     /// How much every node of the bound must rise so that no probe between the nodes lies above it, with a fifth more
-    /// for what lies between the probes. A cloth is probed about the poles only.
+    /// for what lies between the probes. A cloth is probed at the horizon and about the poles only.
     fn shortfalls<S: Scalar>(&self, tables: &FibreTables<S>) -> Vec<[f64; COMPONENTS]> {
         let (rows, nodes) = (self.rows, self.nodes);
         // In cells: the middles of cells and of their edges between rows; the last cell of the first band more often,
-        // because its corner is a pole of the threads across, about which the albedo turns within any distance.
+        // because its corner is a pole of the threads across, about which the albedo turns within any distance. Of a cloth
+        // only the outermost cells: linear in the cosine, it is even in its square root there, which no difference between
+        // the nodes shows.
         let mut probes: Vec<(usize, f64, f64)> = Vec::new();
         for sheet in 0..tables.sheets {
             for half in 0..if self.spec.weave.is_some() { 0 } else { 2 * rows - 1 } {
@@ -382,10 +413,21 @@ impl Grid<'_> {
                     probes.extend((0..nodes).map(|n| (sheet, half as f64 / 2.0, n as f64)));
                 }
             }
+            let last = (nodes - 1) as f64;
             if self.spec.around && self.spec.axis.is_none() {
                 const NEAR: [f64; 6] = [1e-3, 0.01, 0.04, 0.12, 0.3, 0.7];
-                let last = (nodes - 1) as f64;
                 probes.extend(NEAR.iter().flat_map(|r| NEAR.map(|n| (sheet, *r, last - n * n))));
+            }
+            if self.spec.weave.is_some() {
+                // Where they are taken to be level from there to the horizon, albedos have a kink.
+                let halves = (0..2 * nodes - 1).map(|n| n as f64 / 2.0);
+                probes.extend(halves.chain(EDGE).map(|n| (sheet, self.row_of_horizon(sheet, n), n)));
+                for e in EDGE {
+                    probes.extend((0..2 * nodes - 1).map(|n| (sheet, e, n as f64 / 2.0)));
+                    let halves = (0..2 * rows - 1).map(|r| r as f64 / 2.0);
+                    probes.extend(halves.flat_map(|r| [(sheet, r, e), (sheet, r, last - e)]));
+                    probes.extend(EDGE.iter().flat_map(|n| [(sheet, e, *n), (sheet, e, last - n)]));
+                }
             }
         }
         let missing = parallel(&probes, |&(sheet, row, node)| {

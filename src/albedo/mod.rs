@@ -15,4 +15,4 @@ mod visible;
 
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
 pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
-pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, OFFSETS, Ridges, TableSpec};
+pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, HORIZON, OFFSETS, Ridges, TableSpec};

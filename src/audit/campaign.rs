@@ -145,16 +145,16 @@ impl Block {
         };
         match &self.tables {
             PoolTables::Single(curves) => {
-                case.settle(&built, curves, &self.balancer, &mut rng);
+                case.settle(&built, curves, &self.balancer, &mut rng, Effort::Once);
                 if case.verdict != Verdict::Holds {
                     // A peak α·cos wide, narrower than the directions of single precision lie, is integrated to nothing
                     // or to much: the same tables in double precision decide.
                     case.verdict = Verdict::Holds;
-                    case.settle(&built, &curves.in_double(), &self.balancer, &mut rng);
+                    case.settle(&built, &curves.in_double(), &self.balancer, &mut rng, Effort::Twice);
                     case.method = Method::InDouble;
                 }
             }
-            PoolTables::Double(curves) => case.settle(&built, curves, &self.balancer, &mut rng),
+            PoolTables::Double(curves) => case.settle(&built, curves, &self.balancer, &mut rng, Effort::Twice),
         }
         case
     }
@@ -197,6 +197,13 @@ pub enum Method {
     InDouble,
 }
 
+/// Whether to try again where quadrature and samples disagree: not in single precision, where double will.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Effort {
+    Once,
+    Twice,
+}
+
 /// What a measurement says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -234,7 +241,14 @@ pub struct Case {
 }
 
 impl Case {
-    fn settle<S: Scalar>(&mut self, tree: &ClosureTree, curves: &Curves<S>, balancer: &Balancer, rng: &mut Pcg64Mcg) {
+    fn settle<S: Scalar>(
+        &mut self,
+        tree: &ClosureTree,
+        curves: &Curves<S>,
+        balancer: &Balancer,
+        rng: &mut Pcg64Mcg,
+        effort: Effort,
+    ) {
         let (globals, layering) = (Globals::default(), self.layering);
         let balanced = layering.rule == LayeringRule::Balanced;
         let balance = balanced.then(|| balancer.solve(tree, &globals, layering.tint, curves));
@@ -256,7 +270,7 @@ impl Case {
                 self.integrate(&subject, w, e, TOLERANCE, |a| a.max() + a.error <= LIMIT);
             }
         }
-        if self.verdict == Verdict::Unresolved {
+        if self.verdict == Verdict::Unresolved && effort == Effort::Twice {
             let e = estimate(&subject, self.side, w, EFFORT_AGAIN, rng);
             self.integrate(&subject, w, e, AGAIN, |_| false);
         }

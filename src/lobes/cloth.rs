@@ -20,7 +20,7 @@ use super::cloth_range;
 use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
 use super::registry::ClosureParams;
 use super::{Lobe, Rgb, Rgb32};
-use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, Ridges, TableSpec};
+use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, HORIZON, Ridges, TableSpec};
 use crate::optics::{F32x8, Lift, Real, V3, sampling};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
@@ -322,12 +322,19 @@ fn across<R: Real>(w: V3<R>) -> V3<R> {
     V3::new(w.y, -w.x, w.z)
 }
 
+/// A direction no closer to the horizon than [`HORIZON`].
+#[inline(always)]
+fn raised<R: Real>(w: V3<R>) -> V3<R> {
+    V3::new(w.x, w.y, w.z.max(R::c(HORIZON)))
+}
+
 impl<S: Real> Cloth<S> {
     pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
         Self::prepare(yarns, wo, curve, true)
     }
 
     fn prepare(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>, samples: bool) -> Self {
+        let (above, wo) = (wo.z.gt(S::zero()), raised(wo));
         let total = (yarns[0].cover as f64 + yarns[1].cover as f64).max(1.0);
         let covered = (yarns[0].cover + yarns[1].cover).max(1e-6);
         let sampled = |i: usize| (yarns[i].cover / covered) as f64;
@@ -345,7 +352,7 @@ impl<S: Real> Cloth<S> {
         let level = (gap + level(0) + level(1)).max(S::c(1e-6));
         let mut cloth = Cloth { families, wo, scale: one, gap, level, excess: [one; 3] };
         let (_, _, q) = cloth.sums::<S>(wo);
-        cloth.scale = S::select(wo.z.gt(S::zero()), one / q, S::zero());
+        cloth.scale = S::select(above, one / q, S::zero());
         // Integrating needs no division.
         let e = if samples { cloth.bounds(wo, curve) } else { [S::zero(); COMPONENTS] };
         for c in 0..3 {
@@ -357,8 +364,8 @@ impl<S: Real> Cloth<S> {
     /// The surface sum, the volume sums and Q(ωi).
     #[inline(always)]
     fn sums<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L, [L; 2], L) {
-        let wo = V3::<L>::lift(self.wo);
-        let mut q = L::lift(self.gap) * wi.z.max(L::zero());
+        let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
+        let mut q = L::lift(self.gap) * wi.z;
         let (mut surface, mut volume) = (L::zero(), [L::zero(); 2]);
         self.families[0].add(wo, wi, &mut surface, &mut volume[0], &mut q);
         self.families[1].add(across(wo), across(wi), &mut surface, &mut volume[1], &mut q);
@@ -374,12 +381,14 @@ impl<S: Real> Cloth<S> {
 
     /// What one family adds to [`parts`](Self::parts).
     fn part<L: Real + Lift<S>>(&self, family: usize, wi: V3<L>) -> [L; COMPONENTS] {
-        let views = [(V3::<L>::lift(self.wo), wi), (across(V3::<L>::lift(self.wo)), across(wi))];
+        let above = wi.z.gt(L::zero());
+        let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
+        let views = [(wo, wi), (across(wo), across(wi))];
         let (mut surface, mut volume) = (L::zero(), L::zero());
-        let mut q = L::lift(self.gap).mul_add(wi.z.max(L::zero()), self.families[1 - family].seen(views[1 - family].1));
+        let mut q = L::lift(self.gap).mul_add(wi.z, self.families[1 - family].seen(views[1 - family].1));
         let (wo, turned) = views[family];
         self.families[family].add(wo, turned, &mut surface, &mut volume, &mut q);
-        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale) / q.max(L::c(MIN_Q)), L::zero());
+        let scale = L::select(above, L::lift(self.scale) / q.max(L::c(MIN_Q)), L::zero());
         let mut parts = [surface * scale, L::zero(), L::zero()];
         parts[WARP + family] = volume * scale;
         parts
@@ -397,9 +406,10 @@ impl<S: Real> Cloth<S> {
         if !curve.fibre().is_empty() {
             return curve.fibre().bound(w, L::zero());
         }
+        let (above, w) = (w.z.gt(L::zero()), raised(w));
         let [warp, weft] = [self.families[0].facing(w), self.families[1].facing(across(w))];
-        let q = L::lift(self.gap).mul_add(w.z.max(L::zero()), warp[0] + weft[0]).max(L::c(MIN_Q));
-        let scale = L::select(w.z.gt(L::zero()), L::one() / (q * L::lift(self.level)), L::zero());
+        let q = L::lift(self.gap).mul_add(w.z, warp[0] + weft[0]).max(L::c(MIN_Q));
+        let scale = L::select(above, L::one() / (q * L::lift(self.level)), L::zero());
         [(warp[1] + weft[1]) * scale, warp[2] * scale, weft[2] * scale]
     }
 

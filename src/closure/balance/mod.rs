@@ -50,6 +50,9 @@ pub enum Unbalanced {
     /// It scatters to the other side, where a one-sided top passes everything: the two sides want different fluxes
     /// through one symmetric kernel.
     Crosses,
+    /// It scatters so narrowly that sums at the tables' cosines miss it. The cosines of both directions are almost the
+    /// same then, and `min` loses almost nothing.
+    Narrow,
     /// It scatters into one direction, whose cosine is that of ωo: there `min` is α(ωo) already, and loses nothing.
     Delta,
 }
@@ -62,6 +65,7 @@ impl Unbalanced {
             Unbalanced::Tangent => "a tangent makes albedos depend on the azimuth",
             Unbalanced::Normal => "its normal is not that of the layers above",
             Unbalanced::Crosses => "it scatters to the other side",
+            Unbalanced::Narrow => "it is too narrow to be solved for",
             Unbalanced::Delta => "one direction needs no balancing",
         }
     }
@@ -191,7 +195,7 @@ type KernelKey = (LobeKind, u32, Vec<u32>);
 pub struct Balancer {
     nodes: usize,
     pair_nodes: usize,
-    kernels: Mutex<HashMap<KernelKey, Option<Arc<Kernel>>>>,
+    kernels: Mutex<HashMap<KernelKey, Result<Arc<Kernel>, Unbalanced>>>,
 }
 
 /// Kernels kept at a time; a host that composes trees without end starts over.
@@ -352,7 +356,7 @@ impl Balancer {
         let bits = plain.iter().map(|v| v.to_bits()).chain([nodes as u32]).collect();
         let key: KernelKey = (kind, site, bits);
         let known = self.known().get(&key).cloned();
-        let kernel = known.unwrap_or_else(|| {
+        known.unwrap_or_else(|| {
             let kernel = Kernel::new(kind, &plain, curves.of(site), nodes).map(Arc::new);
             let mut kernels = self.known();
             if kernels.len() >= MAX_KERNELS {
@@ -360,11 +364,10 @@ impl Balancer {
             }
             kernels.insert(key, kernel.clone());
             kernel
-        });
-        kernel.ok_or(Unbalanced::Crosses)
+        })
     }
 
-    fn known(&self) -> MutexGuard<'_, HashMap<KernelKey, Option<Arc<Kernel>>>> {
+    fn known(&self) -> MutexGuard<'_, HashMap<KernelKey, Result<Arc<Kernel>, Unbalanced>>> {
         self.kernels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,5 +1,6 @@
 //! The means ⟨s⟩ of one lobe as a matrix, and the iteration.
 
+use super::Unbalanced;
 use super::scales::{cosine_at, weight_at};
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, curve};
@@ -10,6 +11,11 @@ use std::f64::consts::PI;
 /// Points per interval between two nodes, and over half the azimuth.
 const POLAR: usize = 3;
 const AZIMUTH: usize = 24;
+/// How many times as many points along both tell what those miss, at every which probe.
+const FINER: usize = 3;
+const CHECKED: usize = 5;
+/// A lobe whose means lie further off than this, along the nodes' coordinate from 0 to 1, is too narrow for them.
+const MOST_ASTRAY: f64 = 1e-3;
 /// The iteration ends when no node's albedo is further from its target than this, relatively.
 const CONVERGED: f64 = 1e-9;
 const ITERATIONS: usize = 500;
@@ -23,6 +29,8 @@ pub struct Kernel {
     pub(super) nodes: usize,
     /// One block of rows if the channels are alike, else three.
     pub(super) channels: Vec<Vec<f32>>,
+    /// How far off the means may lie, along the nodes' coordinate: ⟨s⟩ is known to this times the steepest slope of s.
+    astray: f64,
 }
 
 /// Probes over `nodes` nodes.
@@ -36,23 +44,34 @@ pub(super) fn probe_cosine(k: usize, nodes: usize) -> f64 {
 }
 
 impl Kernel {
-    /// `None` for a lobe that scatters to the other side.
-    pub fn new<S: Scalar>(kind: LobeKind, values: &[f32], curve: &AlbedoCurve<S>, nodes: usize) -> Option<Kernel> {
+    /// # Errors
+    /// For a lobe that scatters to the other side, and for one too narrow to be integrated at the nodes.
+    pub fn new<S: Scalar>(
+        kind: LobeKind,
+        values: &[f32],
+        curve: &AlbedoCurve<S>,
+        nodes: usize,
+    ) -> Result<Kernel, Unbalanced> {
         let at = |cos: f64| AnyLobe::<S>::new(kind, values, V3::polar(S::c(cos), S::zero()), curve);
-        let crosses = [0.1, 0.5, 0.9].iter().any(|cos| {
-            let lobe = at(*cos);
-            let below = |c: &f64| lobe.f(V3::polar(S::c(-c), S::c(0.3)), curve).iter().any(|f| *f > S::zero());
-            [0.1, 0.5, 0.9].iter().any(below)
-        });
-        if crosses {
-            return None;
+        if [0.1, 0.5, 0.9].iter().any(|cos| at(*cos).sides().transmit) {
+            return Err(Unbalanced::Crosses);
         }
-        let directions = directions::<S>(nodes);
+        let directions = |finer: usize| directions::<S>(nodes, POLAR * finer, AZIMUTH * finer);
+        let rows_at = |probes: &[usize], finer: usize| {
+            let directions = directions(finer);
+            curve::parallel(probes, |k| row(&at(probe_cosine(*k, nodes)), curve, &directions, nodes))
+        };
         let all: Vec<usize> = (0..probes(nodes)).collect();
-        let rows = curve::parallel(&all, |k| row(&at(probe_cosine(*k, nodes)), curve, &directions, nodes));
+        let checked: Vec<usize> = all.iter().copied().step_by(CHECKED).collect();
+        let (rows, finer) = (rows_at(&all, 1), rows_at(&checked, FINER));
+        let off = checked.iter().zip(&finer).flat_map(|(k, fine)| (0..3).map(|c| distance(&rows[*k][c], &fine[c])));
+        let astray = off.fold(0.0, f64::max);
+        if astray > MOST_ASTRAY {
+            return Err(Unbalanced::Narrow);
+        }
         let grey = rows.iter().all(|r| r[1] == r[0] && r[2] == r[0]);
         let block = |c: usize| rows.iter().flat_map(|r| r[c].iter().map(|x| *x as f32)).collect();
-        Some(Kernel { nodes, channels: (0..if grey { 1 } else { 3 }).map(block).collect() })
+        Ok(Kernel { nodes, channels: (0..if grey { 1 } else { 3 }).map(block).collect(), astray })
     }
 
     fn mean(&self, channel: usize, probe: usize, s: &[f64]) -> f64 {
@@ -82,10 +101,12 @@ impl Kernel {
     /// By how much each node must be lowered so that s·⟨s⟩ exceeds `alpha` at no probe. Between nodes the excess
     /// counts twice, because a kink close to a node shows in the middle with half its height.
     fn lowering(&self, channel: usize, s: &[f64], alpha: &[f64], factors: &mut [f64]) {
+        let steepest = s.windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max) * (self.nodes - 1) as f64;
         for (k, target) in alpha.iter().enumerate() {
             let (a, b) = (k / 2, k.div_ceil(2));
-            let albedo = 0.5 * (s[a] + s[b]) * self.mean(channel, k, s);
-            let excess = (albedo - target) * if a == b { 1.0 } else { 2.0 };
+            let here = 0.5 * (s[a] + s[b]);
+            let albedo = here * self.mean(channel, k, s);
+            let excess = (albedo - target) * if a == b { 1.0 } else { 2.0 } + here * steepest * self.astray;
             if excess > 0.0 {
                 let factor = target / (target + excess);
                 factors[a] = factors[a].min(factor);
@@ -144,6 +165,17 @@ impl Kernel {
     }
 }
 
+/// How far two rows of weights lie apart: what has to be moved, times how far, along a coordinate from 0 to 1 (Kantorovich
+/// 1942). No mean of an s of slope 1 differs by more.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let (mut moved, mut ahead) = (0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        ahead += a - b;
+        moved += f64::abs(ahead);
+    }
+    moved / (a.len() - 1) as f64
+}
+
 /// A ring of directions at one cosine, the interval it lies in, its share of the two nodes there, and its weight.
 struct Ring<S> {
     interval: usize,
@@ -152,8 +184,8 @@ struct Ring<S> {
     directions: Vec<(V3<S>, f64)>,
 }
 
-fn directions<S: Scalar>(nodes: usize) -> Vec<Ring<S>> {
-    let (polar, azimuth) = (Rule::gauss_legendre(POLAR), Rule::gauss_legendre(AZIMUTH));
+fn directions<S: Scalar>(nodes: usize, polar: usize, azimuth: usize) -> Vec<Ring<S>> {
+    let (polar, azimuth) = (Rule::gauss_legendre(polar), Rule::gauss_legendre(azimuth));
     let mut rings = Vec::new();
     for interval in 0..nodes - 1 {
         for (t, w) in polar.nodes.iter().zip(&polar.weights) {
