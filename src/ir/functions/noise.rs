@@ -10,6 +10,8 @@
 //!
 //! A coordinate that is not finite gives 0; beyond 2³¹ cells repeat.
 
+use crate::optics::dispatch::{Work, widest};
+
 /// Names by their number.
 pub const KINDS: &[&str] = &["uperlin", "noise", "perlin", "snoise", "cell", "hash", "simplex", "usimplex"];
 
@@ -190,18 +192,42 @@ pub(super) fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     }
 }
 
-fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
-    // One body per dimension: its loops are of known length then, which is most of the speed.
-    match at.n {
-        1 => perlin_in::<1, L>(at, channel),
-        2 => perlin_in::<2, L>(at, channel),
-        3 => perlin_in::<3, L>(at, channel),
-        _ => perlin_in::<4, L>(at, channel),
+/// Gradient noise, which [`widest`] compiles.
+struct Perlin<'a, const L: usize> {
+    at: &'a At<L>,
+    channel: u32,
+}
+
+impl<const L: usize> Work for Perlin<'_, L> {
+    type Output = [f32; L];
+
+    #[inline(always)]
+    fn run(self) -> [f32; L] {
+        // One body per dimension: its loops are of known length then, which is most of the speed.
+        match self.at.n {
+            1 => self.lattice::<1>(),
+            2 => self.lattice::<2>(),
+            3 => self.lattice::<3>(),
+            _ => self.lattice::<4>(),
+        }
     }
 }
 
-fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
-    lattice(std::array::from_fn::<_, N, _>(|d| at.around(d)), channel)
+impl<const L: usize> Perlin<'_, L> {
+    #[inline(always)]
+    fn lattice<const N: usize>(&self) -> [f32; L] {
+        let mut around = [([[0; L]; 2], [0.0; L]); N];
+        for d in 0..N {
+            around[d] = self.at.around(d);
+        }
+        lattice(around, self.channel)
+    }
+}
+
+fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
+    let perlin = Perlin { at, channel };
+    // A single point fills no vector.
+    if L > 1 { widest(perlin) } else { perlin.run() }
 }
 
 /// Gradient noise between lattice points, given the cells around each coordinate and how far it lies above the lower.
