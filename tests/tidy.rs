@@ -13,7 +13,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("albedo", &["optics"]),
     ("lobes", &["albedo", "optics"]),
     ("closure", &["lobes", "albedo", "optics", "globals"]),
-    ("ir", &["syntax", "diag", "span", "lobes", "closure", "globals"]),
+    ("ir", &["syntax", "diag", "span", "lobes", "closure", "optics", "globals"]),
     ("audit", &["engine", "ir", "closure", "lobes", "albedo", "optics", "globals"]),
     ("engine", &["ir", "syntax", "closure", "lobes", "albedo", "optics", "diag", "span", "globals"]),
     ("prove", &["ir", "closure", "lobes", "audit", "optics", "engine", "diag", "span", "globals"]),

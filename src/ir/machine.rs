@@ -6,7 +6,7 @@
 
 use super::body::Cells;
 use super::builtins::{BUILTINS, MAX_ARGS};
-use super::functions::noise;
+use super::functions::{near, noise};
 use super::ops;
 use super::program::{Call, Instr, Program, ShadeError};
 use super::tasks::{Strings, Surroundings};
@@ -163,7 +163,7 @@ fn near_noise<const N: usize>(kind: usize, regs: &[u32], cells: &[u32]) -> Optio
     for d in 0..N {
         x[d] = f32::from_bits(cells[regs[d] as usize]);
     }
-    noise::is_near(kind, &x).then(|| noise::near(kind, x))
+    near::is_near(kind, &x).then(|| near::near(kind, x))
 }
 
 impl Call {

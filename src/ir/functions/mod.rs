@@ -2,5 +2,6 @@
 
 pub mod color;
 pub mod matrix;
+pub mod near;
 pub mod noise;
 pub mod text;

@@ -10,6 +10,8 @@
 //!
 //! A coordinate that is not finite gives 0; beyond 2³¹ cells repeat.
 
+use crate::optics::dispatch::{Work, widest};
+
 /// Names by their number.
 pub const KINDS: &[&str] = &["uperlin", "noise", "perlin", "snoise", "cell", "hash", "simplex", "usimplex"];
 
@@ -117,7 +119,7 @@ fn hash(words: &[u32; 4], n: usize, channel: u32) -> u32 {
 
 /// Lets every bit change about half of all bits (Wellons, lowbias32).
 #[inline(always)]
-fn avalanche(mut h: u32) -> u32 {
+pub(super) fn avalanche(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x7feb_352d);
     h ^= h >> 15;
@@ -129,14 +131,14 @@ fn avalanche(mut h: u32) -> u32 {
 /// [`seed`]: one product per coordinate, not per corner, and corners hash side by side. (A sum, because an exclusive or
 /// gives mirrored cells the same hash.)
 #[inline(always)]
-fn share_of(cell: u32, d: usize) -> u32 {
+pub(super) const fn share_of(cell: u32, d: usize) -> u32 {
     const ODD: [u32; 4] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d, 0x27d4_eb2f];
     cell.wrapping_mul(ODD[d])
 }
 
 /// Tells components of a triple and numbers of dimensions apart.
 #[inline(always)]
-fn seed(n: usize, channel: u32) -> u32 {
+pub(super) const fn seed(n: usize, channel: u32) -> u32 {
     0x9e37_79b9u32.wrapping_mul(channel.wrapping_add(n as u32 * 8 + 1))
 }
 
@@ -159,7 +161,7 @@ fn signed(x: f32, h: u32) -> f32 {
 /// The dot product of a hashed gradient with an offset. Choices are selections, not branches, so that corners can be
 /// worked out side by side.
 #[inline(always)]
-fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
+pub(super) fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     let choose = |first: bool, a: f32, b: f32| if first { a } else { b };
     let choice = h & 0xffff;
     // By a mask: where there is no instruction to select floats, a selection of single ones would be a branch after all,
@@ -190,18 +192,42 @@ fn gradient<const N: usize>(h: u32, [x, y, z, w]: [f32; 4]) -> f32 {
     }
 }
 
-fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
-    // One body per dimension: its loops are of known length then, which is most of the speed.
-    match at.n {
-        1 => perlin_in::<1, L>(at, channel),
-        2 => perlin_in::<2, L>(at, channel),
-        3 => perlin_in::<3, L>(at, channel),
-        _ => perlin_in::<4, L>(at, channel),
+/// Gradient noise, which [`widest`] compiles.
+struct Perlin<'a, const L: usize> {
+    at: &'a At<L>,
+    channel: u32,
+}
+
+impl<const L: usize> Work for Perlin<'_, L> {
+    type Output = [f32; L];
+
+    #[inline(always)]
+    fn run(self) -> [f32; L] {
+        // One body per dimension: its loops are of known length then, which is most of the speed.
+        match self.at.n {
+            1 => self.lattice::<1>(),
+            2 => self.lattice::<2>(),
+            3 => self.lattice::<3>(),
+            _ => self.lattice::<4>(),
+        }
     }
 }
 
-fn perlin_in<const N: usize, const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
-    lattice(std::array::from_fn::<_, N, _>(|d| at.around(d)), channel)
+impl<const L: usize> Perlin<'_, L> {
+    #[inline(always)]
+    fn lattice<const N: usize>(&self) -> [f32; L] {
+        let mut around = [([[0; L]; 2], [0.0; L]); N];
+        for d in 0..N {
+            around[d] = self.at.around(d);
+        }
+        lattice(around, self.channel)
+    }
+}
+
+fn perlin<const L: usize>(at: &At<L>, channel: u32) -> [f32; L] {
+    let perlin = Perlin { at, channel };
+    // A single point fills no vector.
+    if L > 1 { widest(perlin) } else { perlin.run() }
 }
 
 /// Gradient noise between lattice points, given the cells around each coordinate and how far it lies above the lower.
@@ -215,7 +241,7 @@ fn lattice<const N: usize, const L: usize>(around: [Around<L>; N], channel: u32)
             let t = t[l];
             (shares[d][0][l], shares[d][1][l]) = (share_of(cells[0][l], d), share_of(cells[1][l], d));
             (offsets[d][0][l], offsets[d][1][l]) = (t, t - 1.0);
-            fade[d][l] = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+            fade[d][l] = faded(t);
         }
     }
     // Bit d of a corner's number is its step along coordinate d.
@@ -239,46 +265,22 @@ fn lattice<const N: usize, const L: usize>(around: [Around<L>; N], channel: u32)
             }
         }
     }
-    // What brings it to ±1: at the middle of a cell all corners' gradients may agree.
-    let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
     let mut out = values[0];
-    out.iter_mut().for_each(|x| *x = (*x / largest).clamp(-1.0, 1.0));
+    out.iter_mut().for_each(|x| *x = in_range::<N>(*x));
     out
 }
 
-/// Coordinates whose cells [`near`] finds are smaller than this.
-const NEAR: f32 = 4_194_304.0;
-
-/// Whether [`near`] will do for a point.
+/// How much of the upper cell's a point gets that lies `t` above the lower.
 #[inline(always)]
-pub fn is_near<const N: usize>(kind: usize, x: &[f32; N]) -> bool {
-    kind < 4 && x.iter().fold(true, |near, x| near & (x.abs() < NEAR))
+pub(super) fn faded(t: f32) -> f32 {
+    t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
 }
 
-/// [`noise`] of channel 0 where [`is_near`] says so and nothing repeats. It takes coordinates by value: from memory they would be
-/// read in pairs, and a pair waits until both of its halves, written apart, have got there.
+/// Brings the greatest to ±1: at the middle of a cell all corners' gradients may agree.
 #[inline(always)]
-pub fn near<const N: usize>(kind: usize, x: [f32; N]) -> f32 {
-    // A loop: `map` is a call.
-    let mut around = [([[0]; 2], [0.0]); N];
-    for d in 0..N {
-        around[d] = around_near(x[d]);
-    }
-    let [value] = lattice(around, 0);
-    if kind < 2 { 0.5 + 0.5 * value } else { value }
-}
-
-/// What [`At::around`] gives, by additions alone.
-#[inline(always)]
-fn around_near(x: f32) -> Around<1> {
-    // In the middle of the floats whose last bit is worth 1: adding it rounds, and the bits of the sum count.
-    const WHOLE: f32 = 12_582_912.0;
-    let sum = x + WHOLE;
-    let rest = x - (sum - WHOLE);
-    // All bits if that rounded up. (-0 is no less than the whole number it rounds to.)
-    let up = ((rest + 0.0).to_bits() as i32 >> 31) as u32;
-    let cell = sum.to_bits().wrapping_sub(WHOLE.to_bits()).wrapping_add(up);
-    ([[cell], [cell.wrapping_add(1)]], [rest - f32::from_bits(up & (-1f32).to_bits())])
+pub(super) fn in_range<const N: usize>(x: f32) -> f32 {
+    let largest = [0.5, std::f32::consts::FRAC_1_SQRT_2, 1.0, 1.5][N - 1];
+    (x / largest).clamp(-1.0, 1.0)
 }
 
 fn simplex(at: &At<1>, channel: u32) -> [f32; 1] {
@@ -457,36 +459,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn near_points_get_the_same() {
-        fn compare<const N: usize>(found: &mut usize) {
-            for (k, at) in points(N).enumerate() {
-                // Between lattice points, on them, at both zeros, at the ends of what is near, and beyond.
-                let x: [f32; N] = std::array::from_fn(|d| match (k >> (2 * d)) % 8 {
-                    0 => at.x[d][0].round(),
-                    1 => -0.0,
-                    2 => at.x[d][0] * 1e-9,
-                    3 => at.x[d][0] * 1e5,
-                    4 => NEAR.next_down() * at.x[d][0].signum(),
-                    5 if d == 0 => [NEAR, f32::NAN, f32::NEG_INFINITY][k % 3],
-                    _ => at.x[d][0],
-                });
-                let at = At { x: std::array::from_fn(|d| [*x.get(d).unwrap_or(&0.0)]), ..at };
-                assert_eq!(is_near(0, &x), x.iter().all(|x| x.abs() < NEAR), "{x:?}");
-                for kind in (0..KINDS.len()).filter(|kind| is_near(*kind, &x)) {
-                    let (one, other) = (near(kind, x), noise(kind, &at, 0));
-                    assert_eq!(one.to_bits(), other.to_bits(), "{} at {x:?}", KINDS[kind]);
-                    *found += 1;
-                }
-            }
-        }
-        let mut found = 0;
-        compare::<1>(&mut found);
-        compare::<2>(&mut found);
-        compare::<3>(&mut found);
-        compare::<4>(&mut found);
-        assert!(found > 500_000, "{found}");
     }
 }
