@@ -253,7 +253,9 @@ impl FacetSpec {
         let parts = if self.alpha.is_some() { parts } else { 0 };
         let grid = Grid { spec: self, rule: FacetQuadrature::new(precision), rows, nodes };
         let plane = rows * nodes;
-        let fine: Vec<Fine> = (0..sheets).map(|sheet| grid.fine(sheet, precision.margin)).collect();
+        // What `fill` says it may miss is an estimate: not to be as large as the margin of a small table.
+        let tolerance = precision.margin.min(Precision::STANDARD.margin);
+        let fine: Vec<Fine> = (0..sheets).map(|sheet| grid.fine(sheet, tolerance)).collect();
         let albedos: Vec<[Estimate; PARTS + 1]> =
             (0..sheets * plane).map(|k| fine[k / plane].at(2 * (k % plane / nodes), 2 * (k % nodes))).collect();
         let parts_of = |part: usize| albedos.iter().map(move |a| S::c(a[part + 1].0));

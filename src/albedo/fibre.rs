@@ -268,12 +268,7 @@ impl FibreSpec {
     pub fn bake<S: Scalar>(&self, precision: Precision) -> FibreTables<S> {
         let scaled = |count: usize| (count as f64 * self.detail) as usize;
         let size = scaled(precision.cos_nodes);
-        let rule = match self.weave {
-            // Fewer points lose a hundredth between its ridges and its horizons.
-            Some(_) if precision.polar < Precision::STANDARD.polar => Precision::STANDARD,
-            _ => precision,
-        };
-        let rule = FibreQuadrature::new(Precision { polar: scaled(rule.polar), ..rule });
+        let rule = FibreQuadrature::new(Precision { polar: scaled(precision.polar), ..precision });
         let (rows, nodes) = match (self.axis, self.weave) {
             // Every quadrature becomes a node; see `bends`.
             (None, Some(_)) => ((size * 47 / 100).clamp(22, 80), (size * 47 / 100).clamp(22, 80)),

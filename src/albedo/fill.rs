@@ -11,6 +11,10 @@ const STEPS: usize = 8;
 /// Grid steps along the nodes that one panel may cover from the start: so that nothing narrow falls between.
 const WIDEST: usize = 64;
 
+/// How many panels there are at least, if they are more than their points: what happens near one end does not show in points
+/// that far apart.
+const LEAST: usize = 8;
+
 /// A value and how far off it may be.
 pub(super) type Estimate = (f64, f64);
 
@@ -24,7 +28,7 @@ pub(super) fn fill<const N: usize>(
 ) -> Vec<[Estimate; N]> {
     let mut known: Vec<Option<[Estimate; N]>> = vec![None; rows * nodes];
     let mut filled = vec![[(0.0, 0.0); N]; rows * nodes];
-    let width = (nodes - 1).min(WIDEST);
+    let width = (nodes - 1).min(WIDEST).min((nodes / LEAST).max(STEPS)).min(nodes - 1);
     let mut open: Vec<Panel> = (0..nodes - 1)
         .step_by(width)
         .map(|node| Panel { row: Side { from: 0, steps: rows - 1 }, node: Side { from: node, steps: width } })

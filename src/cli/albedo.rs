@@ -125,7 +125,7 @@ pub(super) fn explain<S: Evaluate>(
     if bsdf.lobe_count() > MAX_EXPLAINED {
         return json!({ "note": format!("{} lobes are too many to tell apart", bsdf.lobe_count()) });
     }
-    let shares = breakdown(&|_| part(&tree), w, tolerance);
+    let shares = breakdown(&|_| S::shade(material, &seen, w).unwrap_or_else(black), w, tolerance);
     let ledger = ledger(&tree, part, material.layering(), w, tolerance);
     explained(&bsdf, &shares, &ledger, total)
 }

@@ -34,7 +34,7 @@ use crate::lobes::registry::{LobeClass, ParamTy};
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
 use crate::optics::{Scalar, V3};
 use scales::Scales;
-use solve::{probe_cosine, probes};
+use solve::{target_cosine, targets};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -49,6 +49,7 @@ pub enum Unbalanced {
     Normal,
     /// It scatters to the other side, where a one-sided top passes everything: the two sides want different fluxes
     /// through one symmetric kernel.
+    /// A lobe that reflects on both sides is not told apart from one that does.
     Crosses,
     /// It scatters so narrowly that sums at the tables' cosines miss it. The cosines of both directions are almost the
     /// same then, and `min` loses almost nothing.
@@ -229,10 +230,10 @@ impl Balancer {
         let mut planner = Planner { globals, curves, chain: Chain::default(), lobes: vec![], balancer: self };
         walk(tree, &mut planner);
         let lobes = planner.lobes;
-        // One walk per probe gives α there for every lobe.
-        let alphas: Vec<Vec<Rgb<f64>>> = (0..probes(nodes))
+        // One walk per cosine gives α there for every lobe.
+        let alphas: Vec<Vec<Rgb<f64>>> = (0..targets(nodes))
             .map(|k| {
-                let wo = V3::polar(S::c(probe_cosine(k, nodes)), S::zero());
+                let wo = V3::polar(S::c(target_cosine(k, nodes)), S::zero());
                 let mut passed = Passed { wo, tint, curves, stack: Box::default(), passed: vec![] };
                 walk(tree, &mut passed);
                 passed.passed
@@ -348,7 +349,7 @@ impl Balancer {
         let mut plain = values.to_vec();
         let mut at = 0;
         for p in kind.spec().params {
-            if p.ty == ParamTy::Normal || (p.ty == ParamTy::Color && is_weight(kind, at)) {
+            if p.ty == ParamTy::Normal || (p.ty == ParamTy::Color && is_weight(kind, at, values)) {
                 plain[at..at + p.ty.slots()].fill(1.0);
             }
             at += p.ty.slots();
@@ -387,6 +388,8 @@ struct Varying {
 fn known(site: &Construction<'_>) -> Option<(Vec<f32>, Option<Varying>)> {
     let mut values = Vec::new();
     let mut varying = None;
+    // Whether a color is a weight may depend on other parameters, but not on those that may be unknown.
+    let guess: Vec<f32> = site.values.iter().map(|v| v.unwrap_or_default()).collect();
     for p in site.kind.spec().params {
         let given = &site.values[values.len()..values.len() + p.ty.slots()];
         if given.iter().all(Option::is_some) {
@@ -395,7 +398,7 @@ fn known(site: &Construction<'_>) -> Option<(Vec<f32>, Option<Varying>)> {
         }
         match p.ty {
             ParamTy::Normal => values.extend([0.0, 0.0, 1.0]),
-            ParamTy::Color if is_weight(site.kind, values.len()) => values.extend([1.0; 3]),
+            ParamTy::Color if is_weight(site.kind, values.len(), &guess) => values.extend([1.0; 3]),
             ParamTy::Float if varying.is_none() && p.min >= 0.0 && p.max.is_finite() => {
                 varying = Some(Varying { slot: values.len(), lo: p.min.into(), hi: p.max.into() });
                 values.push(p.min);
@@ -406,10 +409,10 @@ fn known(site: &Construction<'_>) -> Option<(Vec<f32>, Option<Varying>)> {
     Some((values, varying))
 }
 
-/// Whether the color in these slots is the lobe's weight.
-fn is_weight(kind: LobeKind, slot: usize) -> bool {
+/// Whether the color in these slots is the lobe's weight, the other parameters as in `values`.
+fn is_weight(kind: LobeKind, slot: usize, values: &[f32]) -> bool {
     let probe = [0.25, 0.5, 0.75];
-    let mut values = vec![0.0; kind.spec().slot_count()];
+    let mut values = values.to_vec();
     values[slot..slot + 3].copy_from_slice(&probe);
     kind.weight(&values) == probe
 }

@@ -34,18 +34,31 @@ pub struct Kernel {
 }
 
 /// Probes over `nodes` nodes.
-pub(super) fn probes(nodes: usize) -> usize {
+fn probes(nodes: usize) -> usize {
     2 * nodes - 1
 }
 
+/// How many places from one probe to the next where α is asked for: it may have kinks anywhere, and costs little.
+const FINE: usize = 4;
+
+/// Places over `nodes` nodes where α is asked for.
+pub(super) fn targets(nodes: usize) -> usize {
+    2 * FINE * (nodes - 1) + 1
+}
+
+/// The cosine of the `k`th of them.
+pub(super) fn target_cosine(k: usize, nodes: usize) -> f64 {
+    cosine_at(k as f64 / (2 * FINE * (nodes - 1)) as f64)
+}
+
 /// The cosine of probe `k`.
-pub(super) fn probe_cosine(k: usize, nodes: usize) -> f64 {
+fn probe_cosine(k: usize, nodes: usize) -> f64 {
     cosine_at(k as f64 / (2 * (nodes - 1)) as f64)
 }
 
 impl Kernel {
     /// # Errors
-    /// For a lobe that scatters to the other side, and for one too narrow to be integrated at the nodes.
+    /// For a lobe that scatters to the other side or on it, and for one too narrow to be integrated at the nodes.
     pub fn new<S: Scalar>(
         kind: LobeKind,
         values: &[f32],
@@ -53,7 +66,8 @@ impl Kernel {
         nodes: usize,
     ) -> Result<Kernel, Unbalanced> {
         let at = |cos: f64| AnyLobe::<S>::new(kind, values, V3::polar(S::c(cos), S::zero()), curve);
-        if [0.1, 0.5, 0.9].iter().any(|cos| at(*cos).sides().transmit) {
+        let below = |cos: f64| at(-cos).albedo(V3::polar(S::c(-cos), S::zero()), curve).iter().any(|e| *e > S::zero());
+        if [0.1, 0.5, 0.9].iter().any(|cos| at(*cos).sides().transmit || below(*cos)) {
             return Err(Unbalanced::Crosses);
         }
         let directions = |finer: usize| directions::<S>(nodes, POLAR * finer, AZIMUTH * finer);
@@ -79,13 +93,13 @@ impl Kernel {
         row.iter().zip(s).map(|(m, s)| *m as f64 * s).sum()
     }
 
-    /// s at the nodes, so that s·⟨s⟩ is `alpha` (at the probes) or, where that has no solution, below it.
+    /// s at the nodes, so that s·⟨s⟩ is `alpha` (at the [`targets`]) or, where that has no solution, below it.
     pub(super) fn solve(&self, channel: usize, alpha: &[f64]) -> Vec<f64> {
-        let mut s: Vec<f64> = alpha.iter().step_by(2).map(|a| a.sqrt()).collect();
+        let mut s: Vec<f64> = alpha.iter().step_by(2 * FINE).map(|a| a.sqrt()).collect();
         for _ in 0..ITERATIONS {
             let ratio = |j: usize| {
                 let albedo = s[j] * self.mean(channel, 2 * j, &s);
-                if albedo > 0.0 { alpha[2 * j] / albedo } else { 1.0 }
+                if albedo > 0.0 { alpha[2 * FINE * j] / albedo } else { 1.0 }
             };
             let ratios: Vec<f64> = (0..self.nodes).map(ratio).collect();
             for (s, r) in s.iter_mut().zip(&ratios) {
@@ -98,15 +112,21 @@ impl Kernel {
         s
     }
 
-    /// By how much each node must be lowered so that s·⟨s⟩ exceeds `alpha` at no probe. Between nodes the excess
-    /// counts twice, because a kink close to a node shows in the middle with half its height.
+    /// By how much each node must be lowered so that s·⟨s⟩ exceeds `alpha` nowhere. Between nodes the excess counts a fifth
+    /// more, for kinks of α between the places where it is known.
     fn lowering(&self, channel: usize, s: &[f64], alpha: &[f64], factors: &mut [f64]) {
         let steepest = s.windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max) * (self.nodes - 1) as f64;
+        let means: Vec<f64> = (0..probes(self.nodes)).map(|k| self.mean(channel, k, s)).collect();
         for (k, target) in alpha.iter().enumerate() {
-            let (a, b) = (k / 2, k.div_ceil(2));
-            let here = 0.5 * (s[a] + s[b]);
-            let albedo = here * self.mean(channel, k, s);
-            let excess = (albedo - target) * if a == b { 1.0 } else { 2.0 } + here * steepest * self.astray;
+            // ⟨s⟩ is as smooth as the lobe, and straight between probes; s has a bend at every node.
+            let between = |values: &[f64], step: usize| {
+                let (a, b) = (values[k / step], values[k.div_ceil(step)]);
+                a + (b - a) * (k % step) as f64 / step as f64
+            };
+            let (here, mean) = (between(s, 2 * FINE), between(&means, FINE));
+            let (a, b) = (k / (2 * FINE), k.div_ceil(2 * FINE));
+            let albedo = here * mean;
+            let excess = (albedo - target) * if a == b { 1.0 } else { 1.2 } + here * steepest * self.astray;
             if excess > 0.0 {
                 let factor = target / (target + excess);
                 factors[a] = factors[a].min(factor);
@@ -131,14 +151,14 @@ impl Kernel {
     pub(super) fn solve_rows(&self, weights: usize, params: usize, bound: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f64> {
         let along = |j: usize| j as f64 / (2 * (params.max(2) - 1)) as f64;
         // Targets at the rows and halfway between them.
-        let targets = |i: usize, j: usize| -> Vec<f64> {
+        let wanted = |i: usize, j: usize| -> Vec<f64> {
             // Reading is linear in the weight itself between two rows.
             let w = 0.5 * (weight_at(i / 2, weights) + weight_at(i.div_ceil(2), weights));
-            let target = |k| (1.0 - w * bound(along(j), probe_cosine(k, self.nodes))).clamp(0.0, 1.0);
-            (0..probes(self.nodes)).map(target).collect()
+            let target = |k| (1.0 - w * bound(along(j), target_cosine(k, self.nodes))).clamp(0.0, 1.0);
+            (0..targets(self.nodes)).map(target).collect()
         };
         let all: Vec<(usize, usize)> = (0..params).flat_map(|j| (0..weights).map(move |i| (i, j))).collect();
-        let rows = curve::parallel(&all, |&(i, j)| self.solve(0, &targets(2 * i, 2 * j)));
+        let rows = curve::parallel(&all, |&(i, j)| self.solve(0, &wanted(2 * i, 2 * j)));
         let halves: Vec<(usize, usize)> =
             (0..2 * params - 1).flat_map(|j| (0..2 * weights - 1).map(move |i| (i, j))).collect();
         let around = |i: usize, j: usize| {
@@ -150,7 +170,7 @@ impl Kernel {
             let s: Vec<f64> =
                 (0..self.nodes).map(|n| corners.iter().map(|r| rows[*r][n]).sum::<f64>() * 0.25).collect();
             let mut factors = vec![1.0; self.nodes];
-            self.lowering(0, &s, &targets(i, j), &mut factors);
+            self.lowering(0, &s, &wanted(i, j), &mut factors);
             factors
         });
         let mut factors = vec![1.0f64; weights * params * self.nodes];
