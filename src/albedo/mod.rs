@@ -9,6 +9,7 @@ mod facet;
 pub mod facets;
 pub mod fibre;
 mod fill;
+mod grid;
 mod panels;
 pub mod quadrature;
 mod visible;

@@ -29,7 +29,7 @@ pub struct Kernel {
     pub(super) nodes: usize,
     /// One block of rows if the channels are alike, else three.
     pub(super) channels: Vec<Vec<f32>>,
-    /// How far off the means may lie, along the nodes' coordinate: ⟨s⟩ is known to this times the steepest slope of s.
+    /// How far off the means may lie, along the nodes' coordinate: ⟨s⟩ is known to this times the largest slope of s.
     astray: f64,
 }
 
@@ -115,7 +115,7 @@ impl Kernel {
     /// By how much each node must be lowered so that s·⟨s⟩ exceeds `alpha` nowhere. Between nodes the excess counts a fifth
     /// more, for kinks of α between the places where it is known.
     fn lowering(&self, channel: usize, s: &[f64], alpha: &[f64], factors: &mut [f64]) {
-        let steepest = s.windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max) * (self.nodes - 1) as f64;
+        let slope = s.windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max) * (self.nodes - 1) as f64;
         let means: Vec<f64> = (0..probes(self.nodes)).map(|k| self.mean(channel, k, s)).collect();
         for (k, target) in alpha.iter().enumerate() {
             // ⟨s⟩ is as smooth as the lobe, and straight between probes; s has a bend at every node.
@@ -126,7 +126,7 @@ impl Kernel {
             let (here, mean) = (between(s, 2 * FINE), between(&means, FINE));
             let (a, b) = (k / (2 * FINE), k.div_ceil(2 * FINE));
             let albedo = here * mean;
-            let excess = (albedo - target) * if a == b { 1.0 } else { 1.2 } + here * steepest * self.astray;
+            let excess = (albedo - target) * if a == b { 1.0 } else { 1.2 } + here * slope * self.astray;
             if excess > 0.0 {
                 let factor = target / (target + excess);
                 factors[a] = factors[a].min(factor);
