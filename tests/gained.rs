@@ -25,6 +25,15 @@ const GAINED: &[(Tier, LayeringRule, f64, f64, &str)] = &[
     ),
     // By 6e-4: glass bends most within 20 degrees of the normal, between two nodes of a small table.
     (Fast, Min, 0.955, 0.0, r#"dielectric_bsdf(N, vector(1, 0, 0), 1, 1, 0.66, 0.66, 1.227, "ggx")"#),
+    // By 9e-3: a stretched thin wall next to its total reflection.
+    (
+        Standard,
+        View,
+        0.023,
+        303.14,
+        r#"layer(dielectric_bsdf(normal(0.36, -0.53, 0.766), vector(1, 0, 0), 1, 0, 0.0001, 1, 0.1, "ggx",
+            "thin_walled", 1), transparent())"#,
+    ),
     // By a tenth: a mirror that reflects from below too, below a layer that passes less there.
     (
         Fast,

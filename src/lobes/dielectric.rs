@@ -15,7 +15,7 @@
 use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_width, known_widths, metal_reflectance, widths};
+use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -88,7 +88,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         let eta = index(SPEC.params[6].clamp(0, values[14]?));
         let (alpha, facet) = if SPEC.params[8].clamp(0, values[16]?) > 0.0 {
             let key = [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-            (known_widths(SPEC, 4, 12, values), Facet::Mirror { reflectance: pane::parts, key, parts: 2 })
+            (known_thin(SPEC, 4, 12, values, eta), Facet::Mirror { reflectance: pane::parts, key, parts: 2 })
         } else {
             // Without a film its index does not matter.
             let facet = match SPEC.params[9].clamp(0, values[17]?) {
@@ -104,7 +104,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     }
 
     fn follows_tangent(params: &DielectricParams) -> bool {
-        let [x, y] = widths([params.roughness_x, params.roughness_y]);
+        let [x, y] = thin([params.roughness_x, params.roughness_y], index(params.ior));
         params.thin_walled > 0 && x != y
     }
 

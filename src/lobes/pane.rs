@@ -7,8 +7,10 @@
 //! f = R′(c)·D(h)·G₂/(4·μo·μi) for ωi on ωo's side, and the same with 1 − R′(c) for ωi folded over from the other, h from the
 //! folded directions: together the white surface of `lobes::rough`, whose second bounces are split likewise. Reflection
 //! and transmission sum to E + M from either side, and both sides look the same.
+//!
+//! Limit: a wall of an index below 1 is not stretched, two widths count as their geometric mean.
 
-use super::rough::{chance, largest, split, widths};
+use super::rough::{chance, largest, split, thin};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
 use crate::optics::microfacet::{Facets, Shape, mirror};
@@ -63,7 +65,7 @@ impl<S: Real> Pane<S> {
         wo: V3<S>,
         tables: &FacetTables<S>,
     ) -> Self {
-        let alpha = widths(alpha).map(S::from_f32);
+        let alpha = thin(alpha, eta).map(S::from_f32);
         let facets = Facets::new(shape, alpha);
         let side = S::select(wo.z.lt(S::zero()), -S::one(), S::one());
         let wo = V3::new(wo.x, wo.y, wo.z.abs());

@@ -40,6 +40,23 @@ pub(super) fn known_width(spec: &LobeSpec, first: usize, slot: usize, values: &[
     known(spec, first, slot, values).map(|alpha| [f64::from(even(alpha)); 2])
 }
 
+/// The widths of a thin wall of index `eta`. Below 1 it reflects totally beyond an angle and is not stretched either: a
+/// table gained up to 9e-3 next to that edge.
+pub(super) fn thin(alpha: [f32; 2], eta: f64) -> [f32; 2] {
+    if eta < 1.0 { [even(alpha); 2] } else { widths(alpha) }
+}
+
+/// The same of a table, if both are known.
+pub(super) fn known_thin(
+    spec: &LobeSpec,
+    first: usize,
+    slot: usize,
+    values: &[Option<f32>],
+    eta: f64,
+) -> Option<[f64; 2]> {
+    known(spec, first, slot, values).map(|alpha| thin(alpha, eta).map(f64::from))
+}
+
 fn known(spec: &LobeSpec, first: usize, slot: usize, values: &[Option<f32>]) -> Option<[f32; 2]> {
     let value = |k: usize| Some(spec.params[first + k].clamp(0, values[slot + k]?));
     Some([value(0)?, value(1)?])
