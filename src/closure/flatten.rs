@@ -5,7 +5,8 @@
 
 use super::balance::{Balance, Chain};
 use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
-use super::layer::{LayerStack, LayeringRule, TintRule};
+use super::layer::{LayerStack, LayeringRule, TintRule, step};
+use super::sites::Site;
 use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
 use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
@@ -48,9 +49,17 @@ impl<S: Scalar> TableCache<S> {
 #[derive(Clone, Debug, Default)]
 pub struct Curves<S: Scalar> {
     baked: Vec<(TableSpec, Arc<AlbedoCurve<S>>)>,
-    /// Index into `baked` per site.
-    sites: Vec<Option<u32>>,
+    /// By number.
+    sites: Vec<Known<S>>,
     none: AlbedoCurve<S>,
+}
+
+/// What is known of a site before shading.
+#[derive(Clone, Debug, Default)]
+struct Known<S: Scalar> {
+    /// One of those baked.
+    curve: Option<Arc<AlbedoCurve<S>>>,
+    lobe: Option<Site<S>>,
 }
 
 impl<S: Scalar> Curves<S> {
@@ -59,7 +68,7 @@ impl<S: Scalar> Curves<S> {
         let mut curves = Curves::default();
         for (site, kind, values) in tree.lobes() {
             let known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
-            curves.set(site, kind.table(&known), precision);
+            curves.prepare(site, kind, &known, precision, &TableCache::default());
         }
         curves
     }
@@ -71,11 +80,16 @@ impl<S: Scalar> Curves<S> {
 
     /// The same tables in another type, rounded to double precision.
     pub fn cast<T: Scalar>(&self) -> Curves<T> {
-        Curves {
-            baked: self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect(),
-            sites: self.sites.clone(),
-            none: AlbedoCurve::default(),
-        }
+        let baked: Vec<_> = self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect();
+        let none = AlbedoCurve::default();
+        let known = |site: &Known<S>| {
+            let same = |own: &Arc<AlbedoCurve<S>>| self.baked.iter().position(|(_, c)| Arc::ptr_eq(c, own));
+            let curve: Option<Arc<AlbedoCurve<T>>> = site.curve.as_ref().and_then(same).map(|i| baked[i].1.clone());
+            let lobe = site.lobe.as_ref().and_then(|l| l.cast(curve.as_deref().unwrap_or(&none)));
+            Known { curve, lobe }
+        };
+        let sites = self.sites.iter().map(known).collect();
+        Curves { baked, sites, none }
     }
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
@@ -93,10 +107,28 @@ impl<S: Scalar> Curves<S> {
                 self.baked.len() - 1
             }
         };
-        if self.sites.len() <= site as usize {
-            self.sites.resize(site as usize + 1, None);
-        }
-        self.sites[site as usize] = Some(index as u32);
+        let curve = self.baked[index].1.clone();
+        *self.known(site) = Known { curve: Some(curve), lobe: None };
+    }
+
+    /// [`set_shared`](Self::set_shared) with the table of a lobe whose parameter block is known as far as `known` says,
+    /// and all else that can be worked out before shading.
+    pub(crate) fn prepare(
+        &mut self,
+        site: u32,
+        kind: LobeKind,
+        known: &[Option<f32>],
+        precision: Precision,
+        cache: &TableCache<S>,
+    ) {
+        self.set_shared(site, kind.table(known), precision, cache);
+        self.known(site).lobe = Site::new(kind, known, self.of(site));
+    }
+
+    fn known(&mut self, site: u32) -> &mut Known<S> {
+        let count = self.sites.len().max(site as usize + 1);
+        self.sites.resize(count, Known::default());
+        &mut self.sites[site as usize]
     }
 
     /// Memory the tables take.
@@ -105,9 +137,14 @@ impl<S: Scalar> Curves<S> {
     }
 
     pub(super) fn of(&self, site: u32) -> &AlbedoCurve<S> {
+        self.at(site).0
+    }
+
+    /// The curve of a site and what else is known of it.
+    fn at(&self, site: u32) -> (&AlbedoCurve<S>, Option<&Site<S>>) {
         match self.sites.get(site as usize) {
-            Some(Some(index)) => &self.baked[*index as usize].1,
-            _ => &self.none,
+            Some(Known { curve, lobe }) => (curve.as_deref().unwrap_or(&self.none), lobe.as_ref()),
+            None => (&self.none, None),
         }
     }
 }
@@ -197,6 +234,9 @@ struct Flattener<'b, 'm, S: Scalar, const D: usize> {
     stack: LayerStack<S, D>,
     /// What lies above, for balancing.
     chain: Chain<S>,
+    /// What comes before the next lobe, as far as one layer goes, and α toward ωo of the last layer.
+    steps: u8,
+    alpha_o: S,
     /// Lobes met so far, whether they count or not.
     met: usize,
     /// Normal and tangent as the tree gave them, per frame.
@@ -208,7 +248,18 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
         let balance = tables.balance.filter(|_| bsdf.layering.rule == LayeringRule::Balanced);
         let (stack, chain) = (LayerStack::default(), Chain::default());
         let frame_keys = SmallVec::new();
-        Flattener { globals, curves: tables.curves, balance, bsdf, stack, chain, met: 0, frame_keys }
+        Flattener {
+            globals,
+            curves: tables.curves,
+            balance,
+            bsdf,
+            stack,
+            chain,
+            steps: step::NONE,
+            alpha_o: S::one(),
+            met: 0,
+            frame_keys,
+        }
     }
 
     fn chained(&mut self, f: impl FnOnce(&mut Chain<S>)) {
@@ -234,6 +285,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn begin(&mut self) {
         self.stack.begin();
         self.chained(Chain::begin);
+        self.steps = step::BEGIN | step::CLEAR;
         self.bsdf.ops.push(Op::Begin);
     }
 
@@ -241,6 +293,9 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         let Layering { rule, tint } = self.bsdf.layering;
         let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
         self.chained(Chain::middle);
+        // Where the top came to nothing, what bounded the one before must go.
+        self.steps = step::MIDDLE | (self.steps & step::BEGIN);
+        self.alpha_o = alpha[0];
         self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
         self.bsdf.ops.push(Op::Middle);
     }
@@ -248,10 +303,15 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn end(&mut self) {
         self.stack.end();
         self.chained(Chain::end);
+        self.steps = step::CLEAR;
         self.bsdf.ops.push(Op::End);
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
+        let (curve, known) = self.curves.at(visit.site);
+        let known = known.filter(|k| k.is_of(visit.kind, visit.values));
+        let color = known.map_or_else(|| visit.kind.weight(visit.values), Site::weight);
+        let visit = visit.times(color);
         let LobeVisit { kind, site, values, weights: w } = visit;
         let met = self.met;
         self.met += 1;
@@ -259,7 +319,6 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             return;
         }
         let frame = self.frame(kind, values);
-        let curve = self.curves.of(site);
         let normal = self.bsdf.frames[frame as usize].n;
         let wo = self.bsdf.frames[frame as usize].to_local(self.bsdf.wo);
         let scale = self.stack.scale();
@@ -269,19 +328,20 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         let lobes = &mut self.bsdf.lobes;
         // Made where it stays, because it is large.
         lobes.push(FlatLobe {
-            lobe: AnyLobe::new(kind, values, wo, curve),
+            share: [w.total[0], w.total[1], w.total[2], S::zero()],
+            lobe: match known.and_then(|k| k.toward(wo, curve)) {
+                Some(lobe) => lobe,
+                None => AnyLobe::new(kind, values, wo, curve),
+            },
             curve,
-            kind,
             site,
             frame,
-            cos_o: wo.z.abs().min(S::one()),
-            weight: w.total,
-            weight_in_top: w.in_top,
+            weight_in_top: [w.in_top[0], w.in_top[1], w.in_top[2], S::zero()],
+            alpha_o: self.alpha_o,
+            steps: self.steps,
             in_top: w.inside && !view,
             delta: kind.class() == LobeClass::Delta,
             albedo: [S::zero(); 3],
-            balanced,
-            probability: S::zero(),
         });
         let Some(l) = lobes.last_mut() else { return };
         if let AnyLobe::Emission(emission) = l.lobe {
@@ -305,6 +365,10 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
             self.chained(|chain| chain.lobe(&visit, normal, param));
         }
+        if self.balance.is_some() {
+            self.bsdf.balanced.push(balanced);
+        }
+        self.steps = step::NONE;
         self.bsdf.ops.push(Op::Lobe);
     }
 }

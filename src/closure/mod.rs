@@ -8,6 +8,7 @@ pub mod layer;
 pub mod parts;
 pub mod query;
 mod scratch;
+mod sites;
 pub mod tree;
 mod walk;
 

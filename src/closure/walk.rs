@@ -4,7 +4,7 @@
 
 use super::tree::{ClosureTree, MAX_WEIGHT, Node, NodeId};
 use crate::globals::Globals;
-use crate::lobes::{LobeKind, Rgb};
+use crate::lobes::{LobeKind, Rgb, Rgb32};
 use crate::optics::{Frame, Scalar, V3};
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -36,8 +36,16 @@ pub(super) struct LobeVisit<'t, S> {
     pub site: u32,
     /// Its parameter block.
     pub values: &'t [f32],
-    /// The lobe's own color included.
+    /// The lobe's own color is not among them.
     pub weights: Weights<S>,
+}
+
+impl<S: Scalar> LobeVisit<'_, S> {
+    /// With the lobe's own color, [`LobeKind::weight`], among the weights.
+    pub fn times(self, color: Rgb32) -> Self {
+        let white = color == [1.0; 3];
+        LobeVisit { weights: if white { self.weights } else { self.weights.times(color.map(S::from_f32)) }, ..self }
+    }
 }
 
 /// What is done along the way.
@@ -82,8 +90,7 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
                 }
                 Node::Lobe { kind, site, slots } => {
                     let values = tree.values(kind, slots);
-                    let weights = w.times(kind.weight(values).map(S::from_f32));
-                    visitor.lobe(LobeVisit { kind, site, values, weights });
+                    visitor.lobe(LobeVisit { kind, site, values, weights: w });
                 }
             }
         }

@@ -35,10 +35,17 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) }
     }
 
+    #[inline(always)]
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+        Some(Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) })
+    }
+
+    #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         [L::select(wi.z.gt(L::zero()), L::lift(self.value), L::zero()); 3]
     }
 
+    #[inline(always)]
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
@@ -51,6 +58,7 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
     }
 
+    #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         [L::select(w.z.gt(L::zero()), L::one(), L::zero()); 3]
     }

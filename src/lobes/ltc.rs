@@ -43,6 +43,27 @@ pub fn read<S: Real>(table: &Table, cos: S, roughness: S) -> [S; PARAMS] {
     })
 }
 
+/// The numbers of `table` at a roughness, for all nodes over the cosine.
+pub fn row(table: &Table, roughness: f64) -> Vec<f64> {
+    let y = (1.0 - roughness.ln() / MIN_ROUGHNESS.ln()).clamp(0.0, 1.0) * (ROUGHNESS_NODES - 1) as f64;
+    let j = y.floor().min((ROUGHNESS_NODES - 2) as f64);
+    let at = |row: usize, k: usize| f64::from(table[row * COS_NODES * PARAMS + k]);
+    let mix = |k: usize| at(j as usize, k) + (at(j as usize + 1, k) - at(j as usize, k)) * (y - j);
+    (0..COS_NODES * PARAMS).map(mix).collect()
+}
+
+/// The four numbers of a [`row`] at a cosine, linearly.
+#[inline(always)]
+pub fn read_row<S: Real>(row: &[S], cos: S) -> [S; PARAMS] {
+    let x = cos.clamp(S::zero(), S::one()).sqrt() * S::c((COS_NODES - 1) as f64);
+    let i = x.whole().min(S::c((COS_NODES - 2) as f64));
+    let start = i * S::c(PARAMS as f64);
+    std::array::from_fn(|p| {
+        let pick = |offset: usize| S::gather(row, start + S::c((offset * PARAMS + p) as f64));
+        (pick(1) - pick(0)).mul_add(x - i, pick(0))
+    })
+}
+
 /// A transformed cosine, turned toward ωo's azimuth, and the share of uniform directions mixed into it.
 #[derive(Clone, Copy, Debug)]
 pub struct Ltc<S> {

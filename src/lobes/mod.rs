@@ -132,6 +132,13 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Prepares everything that depends on the parameters and on ωo alone.
     fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self;
 
+    /// The same lobe for another ωo: the bits that [`new`](Lobe::new) gives for the same parameters. `None` if there is no
+    /// shorter way.
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+        let _ = (wo, curve);
+        None
+    }
+
     /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
@@ -194,6 +201,7 @@ pub trait Lobe<S: Real>: Sized + Copy {
 
 /// All that an evaluation asks of a lobe for one direction, or for several side by side.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Evaluated<L> {
     /// See [`Lobe::f`].
     pub f: Rgb<L>,
@@ -327,15 +335,33 @@ macro_rules! lobes {
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
             }
+            /// See [`Lobe::toward`].
+            pub fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+                match self {
+                    $( AnyLobe::$Lobe(l) => Lobe::<S>::toward(l, wo, curve).map(AnyLobe::$Lobe), )*
+                    AnyLobe::Host(_) => None,
+                }
+            }
+            /// What it is.
+            pub fn kind(&self) -> LobeKind {
+                match self { $( AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
+            }
             /// What evaluating a BSDF needs of a lobe, in one call.
             #[inline(always)]
             pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
                 match self {
+                    AnyLobe::Diffuse(l) => evaluate(l, wi, curve, bound),
+                    AnyLobe::Sheen(l) => evaluate(l, wi, curve, bound),
+                    AnyLobe::OrenNayar(l) => evaluate(l, wi, curve, bound),
+                    _ => self.evaluate_apart(wi, curve, bound),
+                }
+            }
+            /// Apart, so that a walk stays short whatever lobes there are.
+            #[inline(never)]
+            fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+                match self {
                     $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
-                    AnyLobe::Host(l) => {
-                        let bound = if bound { l.albedo_bound(wi) } else { [S::zero(); 3] };
-                        Evaluated { f: l.f(wi), pdf: l.pdf(wi), bound }
-                    }
+                    AnyLobe::Host(l) => l.evaluate(wi, bound),
                 }
             }
             /// See [`Lobe::f`].

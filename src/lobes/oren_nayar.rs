@@ -97,6 +97,11 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         OrenNayar { excess: lobe.raw_albedo(wo).max(S::one()), ..lobe }
     }
 
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+        let excess = self.raw_albedo(wo).max(S::one());
+        Some(OrenNayar { wo, excess, scale: Self::on_side(wo.z, S::c(FRAC_1_PI)), ..*self })
+    }
+
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);

@@ -103,6 +103,10 @@ impl Real for f32 {
         elementary::floor(self)
     }
     #[inline(always)]
+    fn whole(self) -> Self {
+        elementary::whole(self)
+    }
+    #[inline(always)]
     fn pick(table: &[f32], index: Self) -> Self {
         <f32 as Lift<f32>>::gather(table, index)
     }
@@ -271,6 +275,10 @@ impl Real for F32x8 {
     #[inline(always)]
     fn floor(self) -> Self {
         self.map(elementary::floor)
+    }
+    #[inline(always)]
+    fn whole(self) -> Self {
+        self.map(elementary::whole)
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {

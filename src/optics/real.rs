@@ -45,6 +45,10 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// The next whole number below.
     fn floor(self) -> Self;
+    /// [`floor`](Self::floor) of a number in [0, 2²²], for less: the cell of a table.
+    fn whole(self) -> Self {
+        self.floor()
+    }
     /// `self·a + b`, fused where the machine fuses.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// `self·a + o·b` with double-precision constants, rounded once: keeps its digits where the two products cancel.

@@ -11,6 +11,7 @@ pub fn cosine_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
 }
 
 /// Density of [`cosine_hemisphere`]; 0 below the surface.
+#[inline(always)]
 pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
     cos.max(R::zero()) * R::c(FRAC_1_PI)
 }

@@ -437,6 +437,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
+        let visit = visit.times(visit.kind.weight(visit.values));
         let LobeVisit { kind, site, values, .. } = visit;
         if kind.class() == LobeClass::Emission {
             self.lobes.push((kind, None));
@@ -475,7 +476,7 @@ impl<S: Scalar> Visitor<S> for Passed<'_, S> {
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
-        let LobeVisit { kind, site, values, weights } = visit;
+        let LobeVisit { kind, site, values, weights } = visit.times(visit.kind.weight(visit.values));
         self.passed.push(self.stack.scale().map(S::to_f64));
         if kind.class() != LobeClass::Emission {
             let curve = self.curves.of(site);
