@@ -10,7 +10,7 @@ use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch};
+use crate::optics::{Frame, Lift, Real, Scalar, V3};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -108,7 +108,7 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(super) ng: V3<S>,
     pub(crate) layering: Layering,
     /// The most layers open at once.
-    depth: u16,
+    pub(super) depth: u16,
     pub(crate) ops: SmallVec<[Op; 32]>,
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
     /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
@@ -150,17 +150,13 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 
     /// Turns estimated albedos into probabilities and drops nothing.
+    #[inline(always)]
     pub(crate) fn finish(&mut self) {
-        let share = |l: &FlatLobe<S>| {
-            let largest = l.albedo[0].max(l.albedo[1]).max(l.albedo[2]).max(S::zero());
-            // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
-            largest.min(S::c(1e30))
-        };
-        let total = self.lobes.iter().map(share).fold(S::zero(), |a, b| a + b);
-        let n = self.lobes.len();
+        // Until now the estimates themselves, by their largest channel.
+        let total = self.lobes.iter().fold(S::zero(), |sum, l| sum + l.share[3]);
+        let even = if total > S::zero() { None } else { Some(S::one() / S::c(self.lobes.len() as f64)) };
         for l in &mut self.lobes {
-            let p = if total > S::zero() { share(l) / total } else { S::one() / S::c(n as f64) };
-            l.share[3] = p;
+            l.share[3] = even.unwrap_or(l.share[3] / total);
         }
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
         for s in &mut self.signals {
@@ -316,7 +312,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// Whether [`walk_flat`](Self::walk_flat) will do: no layers in layers, all channels dimmed alike, nothing solved for.
     #[inline(always)]
-    fn is_flat(&self) -> bool {
+    pub(super) fn is_flat(&self) -> bool {
         self.depth <= 1 && self.layering.tint == TintRule::Largest && self.balanced.is_empty()
     }
 
@@ -405,21 +401,6 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 }
 
-impl<'m> Bsdf<'m, f32> {
-    /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are. Like a
-    /// `zip` it ends with the shorter of the two slices.
-    pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
-        let count = wi.len().min(out.len());
-        let (wi, out) = (&wi[..count], &mut out[..count]);
-        // Rare trees are not worth code of their own.
-        if usize::from(self.depth) <= DEPTH_IN_LANES && self.layering.tint == TintRule::Largest {
-            dispatch::widest(Batch { bsdf: self, wi, out });
-        } else {
-            out.iter_mut().zip(wi).for_each(|(out, wi)| *out = self.eval(*wi));
-        }
-    }
-}
-
 /// Is shown every lobe: its index, what the layers above it scale it by for this ωi, the direction in its frame, and
 /// whether its bound there is asked for, which is then to be returned.
 pub(crate) trait Visit<'m, S: Real, L> {
@@ -452,62 +433,15 @@ impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
     }
 }
 
-/// Likewise for lanes.
-impl<'m> Visit<'m, f32, F32x8> for &mut [F32x8; 4] {
-    #[inline(always)]
-    fn lobe(
-        &mut self,
-        _: usize,
-        l: &FlatLobe<'m, f32>,
-        scale: Rgb<F32x8>,
-        local: V3<F32x8>,
-        bound: bool,
-    ) -> Rgb<F32x8> {
-        let e = l.lobe.evaluate_lanes(&local, l.curve, bound);
-        add(self, l, scale, local.z, &e);
-        e.bound
-    }
-}
-
-/// How many layers may be open at once for directions to be worked on side by side.
-const DEPTH_IN_LANES: usize = 4;
-
-/// The work of [`Bsdf::eval_batch`], compiled for each instruction set that is chosen from at run time.
-struct Batch<'a, 'm> {
-    bsdf: &'a Bsdf<'m>,
-    wi: &'a [[f32; 3]],
-    out: &'a mut [Eval],
-}
-
-impl dispatch::Work for Batch<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Batch { bsdf, wi, out } = self;
-        for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
-            let mut block = [[0.0; F32x8::LANES]; 3];
-            for (i, w) in wi.iter().enumerate() {
-                for c in 0..3 {
-                    block[c][i] = w[c];
-                }
-            }
-            let [x, y, z] = block.map(F32x8);
-            let mut sum = [F32x8::zero(); 4];
-            let wi_lanes = unit_or_zero(V3::new(x, y, z));
-            bsdf.walk_within::<F32x8, DEPTH_IN_LANES, 1>(wi_lanes, false, &mut sum);
-            let [r, g, b, pdf] = sum;
-            let f_cos = [r, g, b].map(finite);
-            for i in 0..wi.len() {
-                out[i] = Eval { f_cos: f_cos.map(|f| f.0[i]), pdf: pdf.0[i] };
-            }
-        }
-    }
-}
-
 /// Adds f·|cos| per channel and the pdf of one lobe, scaled by what lies above it.
 #[inline(always)]
-fn add<S: Scalar, L: Real + Lift<S>>(sum: &mut [L; 4], l: &FlatLobe<'_, S>, scale: Rgb<L>, cos: L, e: &Evaluated<L>) {
+pub(super) fn add<S: Scalar, L: Real + Lift<S>>(
+    sum: &mut [L; 4],
+    l: &FlatLobe<'_, S>,
+    scale: Rgb<L>,
+    cos: L,
+    e: &Evaluated<L>,
+) {
     let cos = cos.abs().min(L::one());
     let values = [e.f[0], e.f[1], e.f[2], e.pdf];
     let scales = [scale[0] * cos, scale[1] * cos, scale[2] * cos, L::one()];

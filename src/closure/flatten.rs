@@ -8,7 +8,7 @@ use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
 use super::layer::{LayerStack, LayeringRule, TintRule, step};
 use super::sites::Site;
 use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
-use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
+use super::walk::{self, LobeVisit, Visitor, Weights, directions, first, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
@@ -211,7 +211,8 @@ pub fn flatten_into<'m, S: Scalar>(
     tree.within_budget()?;
     let tables = tables.into();
     match layers {
-        0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
+        0..=1 => walk(tree, &mut Flattener::<S, 1>::new(globals, tables, bsdf)),
+        2..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
         _ => flatten_deep(tree, globals, tables, bsdf),
     }
     bsdf.finish();
@@ -239,15 +240,25 @@ struct Flattener<'b, 'm, S: Scalar, const D: usize> {
     alpha_o: S,
     /// Lobes met so far, whether they count or not.
     met: usize,
-    /// Normal and tangent as the tree gave them, per frame.
-    frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
+    /// One per frame.
+    standing: SmallVec<[Standing<S>; 8]>,
+}
+
+/// How ωo stands in a frame.
+#[derive(Clone, Copy)]
+struct Standing<S> {
+    /// Normal and tangent as the tree gave them.
+    key: (Vec3, Vec3),
+    normal: V3<S>,
+    /// In the frame.
+    wo: V3<S>,
 }
 
 impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
     fn new(globals: &'b Globals, tables: Tables<'m, S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
         let balance = tables.balance.filter(|_| bsdf.layering.rule == LayeringRule::Balanced);
         let (stack, chain) = (LayerStack::default(), Chain::default());
-        let frame_keys = SmallVec::new();
+        let standing = SmallVec::new();
         Flattener {
             globals,
             curves: tables.curves,
@@ -258,7 +269,7 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
             steps: step::NONE,
             alpha_o: S::one(),
             met: 0,
-            frame_keys,
+            standing,
         }
     }
 
@@ -272,12 +283,27 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
     fn frame(&mut self, kind: LobeKind, values: &[f32]) -> u32 {
         let (n, t) = directions(kind, values, self.globals);
         let same = |a: Vec3, b: Vec3| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits);
-        if let Some(i) = self.frame_keys.iter().position(|k| same(k.0, n) && same(k.1, t)) {
+        if let Some(i) = self.standing.iter().position(|s| same(s.key.0, n) && same(s.key.1, t)) {
             return i as u32;
         }
-        self.frame_keys.push((n, t));
-        self.bsdf.frames.push(walk::frame((n, t), self.globals));
-        self.frame_keys.len() as u32 - 1
+        let frame = walk::frame((n, t), self.globals);
+        self.standing.push(Standing { key: (n, t), normal: frame.n, wo: frame.to_local(self.bsdf.wo) });
+        self.bsdf.frames.push(frame);
+        self.standing.len() as u32 - 1
+    }
+
+    /// The lobe just made is no lobe: it gives off light, or tells the renderer something.
+    #[cold]
+    fn emission(&mut self, w: Weights<S>, scale: Rgb<S>) {
+        let Some(l) = self.bsdf.lobes.pop() else { return };
+        let value = std::array::from_fn(|c| w.total[c] * scale[c]);
+        if let AnyLobe::Emission(emission) = l.lobe {
+            for c in 0..3 {
+                self.bsdf.emission[c] += value[c] * emission.radiance();
+            }
+        } else if let Some(kind) = SignalKind::of(&l.lobe) {
+            self.bsdf.signal(kind, value);
+        }
     }
 }
 
@@ -291,12 +317,13 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
 
     fn middle(&mut self, w: Weights<S>) {
         let Layering { rule, tint } = self.bsdf.layering;
-        let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
+        let weight = first(w.in_top);
+        let alpha = self.stack.middle(weight, rule, tint, None::<Rgb<S>>);
         self.chained(Chain::middle);
         // Where the top came to nothing, what bounded the one before must go.
         self.steps = step::MIDDLE | (self.steps & step::BEGIN);
         self.alpha_o = alpha[0];
-        self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
+        self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight });
         self.bsdf.ops.push(Op::Middle);
     }
 
@@ -310,57 +337,53 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
         let (curve, known) = self.curves.at(visit.site);
         let known = known.filter(|k| k.is_of(visit.kind, visit.values));
-        let color = known.map_or_else(|| visit.kind.weight(visit.values), Site::weight);
-        let visit = visit.times(color);
+        let visit = match known {
+            Some(known) => LobeVisit { weights: known.tinted(visit.weights), ..visit },
+            None => visit.tinted(),
+        };
         let LobeVisit { kind, site, values, weights: w } = visit;
         let met = self.met;
         self.met += 1;
-        if w.total.iter().all(|w| *w <= S::zero()) && !w.inside {
+        if first(w.total).iter().all(|w| *w <= S::zero()) && !w.inside {
             return;
         }
         let frame = self.frame(kind, values);
-        let normal = self.bsdf.frames[frame as usize].n;
-        let wo = self.bsdf.frames[frame as usize].to_local(self.bsdf.wo);
+        let Standing { normal, wo, .. } = self.standing[frame as usize];
         let scale = self.stack.scale();
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
-        let lobes = &mut self.bsdf.lobes;
-        // Made where it stays, because it is large.
-        lobes.push(FlatLobe {
-            share: [w.total[0], w.total[1], w.total[2], S::zero()],
-            lobe: match known.and_then(|k| k.toward(wo, curve)) {
-                Some(lobe) => lobe,
-                None => AnyLobe::new(kind, values, wo, curve),
-            },
+        let class = kind.class();
+        self.bsdf.lobes.push(FlatLobe {
+            share: w.total,
+            lobe: AnyLobe::nothing(),
             curve,
             site,
             frame,
-            weight_in_top: [w.in_top[0], w.in_top[1], w.in_top[2], S::zero()],
+            weight_in_top: w.in_top,
             alpha_o: self.alpha_o,
             steps: self.steps,
             in_top: w.inside && !view,
-            delta: kind.class() == LobeClass::Delta,
+            delta: class == LobeClass::Delta,
             albedo: [S::zero(); 3],
         });
-        let Some(l) = lobes.last_mut() else { return };
-        if let AnyLobe::Emission(emission) = l.lobe {
-            for c in 0..3 {
-                self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
-            }
-            lobes.pop();
+        let Some(l) = self.bsdf.lobes.last_mut() else { return };
+        // Made where it stays, because there is room for the largest.
+        if !known.is_some_and(|k| k.turn(wo, curve, &mut l.lobe)) {
+            l.lobe = AnyLobe::new(kind, values, wo, curve);
+        }
+        if class == LobeClass::Emission {
+            self.emission(w, scale);
             return;
         }
-        if let Some(kind) = SignalKind::of(&l.lobe) {
-            lobes.pop();
-            self.bsdf.signal(kind, std::array::from_fn(|c| w.total[c] * scale[c]));
-            return;
-        }
-        let albedo = l.lobe.albedo(wo, curve);
+        let [albedo, bound] = l.lobe.albedos(wo, curve, w.inside && !view);
         l.albedo = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
+        let largest = l.albedo[0].max(l.albedo[1]).max(l.albedo[2]).max(S::zero());
+        // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
+        l.share[3] = largest.min(S::c(1e30));
         if w.inside {
-            let bound = if view { l.lobe.view_bound(wo, curve) } else { l.lobe.albedo_bound(wo, curve) };
-            self.stack.lobe(w.in_top, bound);
+            let bound = if view { l.lobe.view_bound(wo, curve) } else { bound };
+            self.stack.lobe(first(w.in_top), bound);
         }
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
             self.chained(|chain| chain.lobe(&visit, normal, param));

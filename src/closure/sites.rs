@@ -3,6 +3,7 @@
 //! Where a parameter block turns out to be the one that was prepared for, a lobe is turned toward ωo in place of being
 //! made from its parameters. The block is compared each time: nothing here need be told when a tree changes.
 
+use super::walk::Weights;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::registry::ParamTy;
 use crate::lobes::{AnyLobe, LobeKind, Rgb32};
@@ -16,6 +17,7 @@ pub(super) struct Site<S: Scalar> {
     block: Vec<(u32, u32)>,
     /// Its color.
     weight: Rgb32,
+    white: bool,
     /// Prepared for a viewer along the normal.
     lobe: AnyLobe<S>,
 }
@@ -34,7 +36,8 @@ impl<S: Scalar> Site<S> {
         let values: Vec<f32> = block.iter().map(|(bits, _)| f32::from_bits(*bits)).collect();
         let above = V3::new(S::zero(), S::zero(), S::one());
         let lobe = AnyLobe::new(kind, &values, above, curve);
-        Some(Site { kind, block, weight: kind.weight(&values), lobe })
+        let weight = kind.weight(&values);
+        Some(Site { kind, block, weight, white: weight == [1.0; 3], lobe })
     }
 
     /// The same with another table's numbers.
@@ -50,14 +53,15 @@ impl<S: Scalar> Site<S> {
         self.kind == kind && values.iter().zip(&self.block).map(differs).fold(0, |all, d| all | d) == 0
     }
 
-    /// See [`LobeKind::weight`].
-    pub fn weight(&self) -> Rgb32 {
-        self.weight
+    /// `weights` with the lobe's color, [`LobeKind::weight`], among them.
+    #[inline(always)]
+    pub fn tinted(&self, weights: Weights<S>) -> Weights<S> {
+        if self.white { weights } else { weights.times(self.weight) }
     }
 
-    /// The lobe for another ωo, if there is a shorter way than from its parameters.
+    /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters.
     #[inline(always)]
-    pub fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<AnyLobe<S>> {
-        self.lobe.toward(wo, curve)
+    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
+        self.lobe.turn(wo, curve, to)
     }
 }

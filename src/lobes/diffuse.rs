@@ -24,6 +24,13 @@ pub struct Diffuse<S> {
     value: S,
 }
 
+impl<S: Real> Diffuse<S> {
+    /// Scatters nothing.
+    pub(super) fn black() -> Self {
+        Diffuse { value: S::zero() }
+    }
+}
+
 impl<S: Real> Lobe<S> for Diffuse<S> {
     type Params = DiffuseParams;
 
@@ -54,6 +61,7 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         sampling::cosine_hemisphere(u)
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
         [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
     }

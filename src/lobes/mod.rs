@@ -217,6 +217,11 @@ fn evaluate<S: Real>(lobe: &impl Lobe<S>, wi: V3<S>, curve: &AlbedoCurve<S>, bou
     Evaluated { f: lobe.f(wi, curve), pdf: lobe.pdf(wi), bound }
 }
 
+#[inline(always)]
+fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+    [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
+}
+
 /// Long formulas as loops over the lanes, which the compiler makes vector code of; what only reads a table as it is.
 #[inline(always)]
 fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
@@ -335,11 +340,18 @@ macro_rules! lobes {
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
             }
-            /// See [`Lobe::toward`].
-            pub fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+            /// See [`Lobe::toward`]. Written in place, because there is room for the largest lobe. False, and nothing is
+            /// written, if there is no shorter way than [`new`](Self::new).
+            pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
                 match self {
-                    $( AnyLobe::$Lobe(l) => Lobe::<S>::toward(l, wo, curve).map(AnyLobe::$Lobe), )*
-                    AnyLobe::Host(_) => None,
+                    $( AnyLobe::$Lobe(l) => {
+                        let turned = Lobe::<S>::toward(l, wo, curve);
+                        if let Some(turned) = turned {
+                            *to = AnyLobe::$Lobe(turned);
+                        }
+                        turned.is_some()
+                    } )*
+                    AnyLobe::Host(_) => false,
                 }
             }
             /// What it is.
@@ -410,6 +422,28 @@ macro_rules! lobes {
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
                 match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
+            }
+        }
+
+        impl<S: Real> AnyLobe<S> {
+            /// [`albedo`](Self::albedo), and [`albedo_bound`](Self::albedo_bound) if it is asked for. Here, not in a call, for
+            /// the lobes that most materials are made of: three numbers that come from a call have to be waited for.
+            #[inline(always)]
+            pub(crate) fn albedos(&self, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+                match self {
+                    AnyLobe::Diffuse(l) => albedos(l, w, curve, bound),
+                    AnyLobe::Sheen(l) => albedos(l, w, curve, bound),
+                    AnyLobe::OrenNayar(l) => albedos(l, w, curve, bound),
+                    _ => {
+                        let bound = if bound { self.albedo_bound(w, curve) } else { [S::zero(); 3] };
+                        [self.albedo(w, curve), bound]
+                    }
+                }
+            }
+
+            /// The smallest of them, black: until another takes its place.
+            pub(crate) fn nothing() -> Self {
+                AnyLobe::Diffuse(diffuse::Diffuse::black())
             }
         }
 

@@ -491,6 +491,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         self.ltc.sample(u)
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
     }
