@@ -264,6 +264,9 @@ impl<S: Real> AlbedoCurve<S> {
         if table.is_empty() {
             return L::zero();
         }
+        if self.rows == 1 {
+            return L::quartic(table, self.cells[0], cos);
+        }
         let [cells, row_cells] = self.cells.map(L::lift);
         let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * cells;
         let i = x.whole().min(cells - L::one());
@@ -273,16 +276,11 @@ impl<S: Real> AlbedoCurve<S> {
             let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
             (b - a).mul_add(t, a)
         };
-        let value = if self.rows == 1 {
-            let (a, b) = (L::gather(table, i), L::gather(table, i + L::one()));
-            (b - a).mul_add(t, a)
-        } else {
-            let y = (parameter.safe_sqrt() - L::lift(self.lo)) * L::lift(self.inv_range);
-            let y = y.clamp(L::zero(), L::one()) * row_cells;
-            let j = y.whole().min(row_cells - L::one());
-            let (a, b) = (row(j), row(j + L::one()));
-            (b - a).mul_add(y - j, a)
-        };
+        let y = (parameter.safe_sqrt() - L::lift(self.lo)) * L::lift(self.inv_range);
+        let y = y.clamp(L::zero(), L::one()) * row_cells;
+        let j = y.whole().min(row_cells - L::one());
+        let (a, b) = (row(j), row(j + L::one()));
+        let value = (b - a).mul_add(y - j, a);
         L::select(cos.gt(L::zero()), value, L::zero())
     }
 }

@@ -45,7 +45,11 @@ pub enum TintRule {
 pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
     let pass = |e: L| (L::one() - e).clamp(L::zero(), L::one());
     match tint {
-        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); C],
+        TintRule::Largest => {
+            // Not `max`, which looks out for NaN: that passes nothing either way.
+            let larger = |a: L, b: L| L::select(a.gt(b), a, b);
+            [pass(larger(larger(bound[0], bound[1]), bound[2])); C]
+        }
         TintRule::Channel => std::array::from_fn(|c| pass(bound[c])),
     }
 }

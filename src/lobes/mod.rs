@@ -226,8 +226,19 @@ fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound
 #[inline(always)]
 fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
     let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
-    let [pdf, ..] = over_lanes(wi, |w| [lobe.pdf(w); 3]);
-    Evaluated { f: lobe.f_lanes(wi, curve), pdf, bound }
+    Evaluated { f: lobe.f_lanes(wi, curve), pdf: each_lane(wi, |w| lobe.pdf(w)), bound }
+}
+
+/// One number of every lane.
+#[inline(always)]
+pub(crate) fn each_lane(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> f32) -> F32x8 {
+    // What the loop reads and writes is local, so that nothing it writes can be something it reads.
+    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
+    let mut out = [0.0; F32x8::LANES];
+    for i in 0..F32x8::LANES {
+        out[i] = f(V3::new(x[i], y[i], z[i]));
+    }
+    F32x8(out)
 }
 
 /// `f` of every lane.

@@ -29,7 +29,7 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb, over_lanes};
+use super::{Lobe, LobeKind, Rgb, each_lane};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::{F32x8, Lift, Real, V3};
 
@@ -471,13 +471,14 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         f32: Lift<S>,
         F32x8: Lift<S>,
     {
-        let [value, ..] = match self.shadowing {
-            Shadowing::Fitted(fitted) => over_lanes(wi, |w| [self.fitted(fitted, w); 3]),
+        let value = match self.shadowing {
+            Shadowing::Fitted(fitted) => each_lane(wi, |w| self.fitted(fitted, w)),
             Shadowing::Exact { exact, cos_lambda_o } => {
-                over_lanes(wi, |w| [self.exact(exact, cos_lambda_o, w, split(curve.extra()).0); 3])
+                let terms = split(curve.extra()).0;
+                each_lane(wi, |w| self.exact(exact, cos_lambda_o, w, terms))
             }
-            Shadowing::Visibility => over_lanes(wi, |w| [self.visible(w); 3]),
-            Shadowing::Transformed { albedo } => over_lanes(wi, |w| [self.transformed(albedo, w); 3]),
+            Shadowing::Visibility => each_lane(wi, |w| self.visible(w)),
+            Shadowing::Transformed { albedo } => each_lane(wi, |w| self.transformed(albedo, w)),
         };
         self.kept(*wi, curve, value)
     }

@@ -348,6 +348,27 @@ impl Lift<f32> for F32x8 {
     fn gather(table: &[f32], index: Self) -> Self {
         index.map(|i| <f32 as Lift<f32>>::gather(table, i))
     }
+    /// In three loops: the one in the middle, which reads, cannot become vector code, and would keep the rest from it.
+    #[inline(always)]
+    fn quartic(table: &[f32], cells: f32, x: Self) -> Self {
+        let (mut first, mut part) = ([0; 8], [0.0; 8]);
+        for k in 0..8 {
+            let place = Real::clamp(x.0[k], 0.0, 1.0).sqrt().sqrt() * cells;
+            let i = Real::min(Real::whole(place), cells - 1.0);
+            (first[k], part[k]) = (elementary::index(i) as u32, place - i);
+        }
+        let (mut a, mut b) = ([0.0; 8], [0.0; 8]);
+        for k in 0..8 {
+            if let Some([low, high]) = table.get(first[k] as usize..).and_then(|rest| rest.first_chunk()) {
+                (a[k], b[k]) = (*low, *high);
+            }
+        }
+        let mut out = [0.0; 8];
+        for k in 0..8 {
+            out[k] = if x.0[k] > 0.0 { (b[k] - a[k]) * part[k] + a[k] } else { 0.0 };
+        }
+        F32x8(out)
+    }
 }
 
 impl Lift<F32x8> for F32x8 {

@@ -132,4 +132,17 @@ pub trait Lift<S>: Sized {
     fn lift(s: S) -> Self;
     /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
     fn gather(table: &[S], index: Self) -> Self;
+
+    /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
+    #[inline(always)]
+    fn quartic(table: &[S], cells: S, x: Self) -> Self
+    where
+        Self: Real + Lift<S>,
+    {
+        let cells = Self::lift(cells);
+        let place = x.clamp(Self::zero(), Self::one()).sqrt().sqrt() * cells;
+        let i = place.whole().min(cells - Self::one());
+        let (a, b) = (Self::gather(table, i), Self::gather(table, i + Self::one()));
+        Self::select(x.gt(Self::zero()), (b - a).mul_add(place - i, a), Self::zero())
+    }
 }
