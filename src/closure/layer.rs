@@ -65,7 +65,7 @@ pub fn scale<L: Real, const C: usize>(rule: LayeringRule, alpha_o: [L; C], alpha
 }
 
 /// What stands before a lobe in a tree without layers in layers: bits of [`FlatStack`]'s steps.
-pub mod step {
+pub(crate) mod step {
     /// Nothing new.
     pub const NONE: u8 = 0;
     /// A top begins.
@@ -77,7 +77,7 @@ pub mod step {
 }
 
 /// [`LayerStack`] for trees without layers in layers, all channels dimmed alike: the same numbers for less.
-pub struct FlatStack<L> {
+pub(crate) struct FlatStack<L> {
     /// Bound on the albedo of the top being walked, so far; the fourth is idle, but four go as one.
     bound: [L; 4],
     scale: L,

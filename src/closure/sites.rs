@@ -65,3 +65,66 @@ impl<S: Scalar> Site<S> {
         self.lobe.turn(wo, curve, to)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::albedo::Precision;
+
+    /// Blocks of every lobe: its defaults, and for sheens every model.
+    fn blocks() -> impl Iterator<Item = (LobeKind, Vec<f32>)> {
+        let defaults = |kind: LobeKind| {
+            let params = kind.spec().params.iter();
+            let values = params.flat_map(|p| (0..p.ty.slots()).map(|k| p.default.get(k).copied().unwrap_or(0.0)));
+            values.collect::<Vec<_>>()
+        };
+        LobeKind::ALL.iter().flat_map(move |kind| {
+            let models = if *kind == LobeKind::Sheen { 0..6 } else { 0..1 };
+            models.map(move |model| {
+                let mut values = defaults(*kind);
+                if *kind == LobeKind::Sheen {
+                    values[8] = model as f32;
+                }
+                (*kind, values)
+            })
+        })
+    }
+
+    #[test]
+    fn a_lobe_turned_is_the_lobe_made_from_its_parameters() {
+        let coarse = Precision { cos_nodes: 8, axis_nodes: 8, polar: 8, azimuth: 8, ..Precision::FAST };
+        let mut turned = 0;
+        for (kind, values) in blocks() {
+            let known: Vec<_> = values.iter().copied().map(Some).collect();
+            let curve = kind.table(&known).map_or_else(AlbedoCurve::<f32>::default, |spec| spec.bake(coarse));
+            let site = Site::new(kind, &known, &curve).expect("all is known");
+            assert!(site.is_of(kind, &values), "{kind:?}");
+            for cos in [0.9f32, 0.3, 1e-3, -0.2] {
+                let wo = V3::polar(cos, 0.7);
+                let mut lobe = AnyLobe::nothing();
+                if !site.turn(wo, &curve, &mut lobe) {
+                    continue;
+                }
+                turned += 1;
+                let made = AnyLobe::new(kind, &values, wo, &curve);
+                for wi in [V3::polar(0.8, 2.0), V3::polar(0.05, -1.0), V3::polar(-0.4, 0.3)] {
+                    let [a, b] = [&lobe, &made].map(|l| l.evaluate(wi, &curve, true));
+                    assert_eq!((a.f, a.pdf, a.bound), (b.f, b.pdf, b.bound), "{kind:?} {values:?} {cos} {wi:?}");
+                }
+                assert_eq!(lobe.sample([0.3, 0.6]), made.sample([0.3, 0.6]), "{kind:?} {values:?} {cos}");
+            }
+        }
+        assert!(turned > 4 * 8, "{turned}");
+    }
+
+    #[test]
+    fn another_block_is_told_apart_and_another_direction_is_not() {
+        let kind = LobeKind::OrenNayar;
+        let site = Site::<f32>::new(kind, &[None, None, None, Some(0.4)], &AlbedoCurve::default());
+        let site = site.expect("directions need not be known");
+        assert!(site.is_of(kind, &[0.0, 0.6, 0.8, 0.4]));
+        assert!(!site.is_of(kind, &[0.0, 0.6, 0.8, 0.3]));
+        assert!(!site.is_of(LobeKind::Sheen, &[0.0, 0.6, 0.8, 0.4]));
+        assert!(Site::<f32>::new(kind, &[Some(0.0), None, None, None], &AlbedoCurve::default()).is_none());
+    }
+}

@@ -124,6 +124,13 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+        match self {
+            Solid(surface) => Some(Solid(surface.toward(wo, curve.facets()))),
+            Thin(_) => None,
+        }
+    }
+
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         match self {

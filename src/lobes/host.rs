@@ -333,7 +333,7 @@ impl<S: Real> Host<S> {
 
 impl<S: Real> Host<S> {
     /// What it is.
-    pub fn kind(&self) -> HostKind {
+    pub(super) fn kind(&self) -> HostKind {
         self.kind
     }
 

@@ -76,42 +76,59 @@ impl<S: Real> Interface<S> {
         wo: V3<S>,
         tables: &FacetTables<S>,
     ) -> Self {
-        let alpha = [S::from_f32(even(alpha)); 2];
-        let facets = Facets::new(shape, alpha);
+        let facets = Facets::new(shape, [S::from_f32(even(alpha)); 2]);
+        let sides = Sides::tinted(tints);
+        let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
+        let odds = [largest(reflected), largest(refracted)];
+        let (zero, none) = (S::zero(), [S::zero(); 2]);
+        Interface {
+            wo,
+            facets,
+            eta,
+            colored,
+            far: zero,
+            side: zero,
+            reach: zero,
+            proposal: zero,
+            reflected,
+            refracted,
+            again: none,
+            crossing: none,
+            even: zero,
+            across: zero,
+            odds,
+            sides,
+        }
+        .toward(wo, tables)
+    }
+
+    /// The same surface seen from another ωo.
+    pub(super) fn toward(self, wo: V3<S>, tables: &FacetTables<S>) -> Self {
+        let Interface { facets, eta, odds, .. } = self;
         let outside = wo.z.gt(S::zero());
         // Both are computed, because a Real cannot branch.
         let pick = |a: S, b: S| S::select(outside, a, b);
-        let side = pick(S::one(), -S::one());
-        let (up, down) = (tables.mean_missing(false, alpha), tables.mean_missing(true, alpha));
+        let (up, down) = (tables.mean_missing(false, facets.alpha()), tables.mean_missing(true, facets.alpha()));
         let (near, far) = (pick(up, down), pick(down, up));
         let inside_flux = S::c(eta * eta) * down;
         let shared = S::c(4.0 * eta / ((1.0 + eta) * (1.0 + eta))) * up.min(inside_flux);
         let tiny = S::c(1e-30);
         let (cross_up, cross_down) = (shared / up.max(tiny), shared / inside_flux.max(tiny));
         let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
-        let missing = tables.missing(wo, alpha) * S::c(FRAC_1_PI);
-        let sides = Sides::tinted(tints);
-        let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
-        let odds = [largest(reflected), largest(refracted)];
+        let missing = tables.missing(wo, facets.alpha()) * S::c(FRAC_1_PI);
         let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
         let even = S::c(1.0 / FRAC_1_PI) * missing * S::select((back + on).gt(S::zero()), S::one(), S::zero());
         Interface {
             wo,
-            facets,
-            eta,
-            colored,
             far: pick(S::c(eta), S::c(1.0 / eta)),
-            side,
+            side: pick(S::one(), -S::one()),
             reach: facets.reach(wo),
             proposal: facets.proposal().reach(wo),
-            reflected,
-            refracted,
             again: [missing * (S::one() - crossing[0]) / near.max(tiny), missing * crossing[0] / far.max(tiny)],
             crossing,
             even,
             across: on / (back + on).max(tiny),
-            odds,
-            sides,
+            ..self
         }
     }
 

@@ -366,7 +366,7 @@ macro_rules! lobes {
                 }
             }
             /// What it is.
-            pub fn kind(&self) -> LobeKind {
+            pub(crate) fn kind(&self) -> LobeKind {
                 match self { $( AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
             }
             /// What evaluating a BSDF needs of a lobe, in one call.
