@@ -16,10 +16,10 @@ use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_width, known_widths, metal_reflectance, widths};
-use super::{Lobe, Rgb, Sides};
+use super::{Lobe, Rgb, Sides, each_lane, over_lanes};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{F32x8, Lift, Real, V3};
 
 closure! {
     /// Reflection and refraction between two media, what bounces between the facets included. Two-sided.
@@ -136,6 +136,30 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         match self {
             Solid(surface) => surface.f(wi, curve.facets()),
             Thin(surface) => surface.f(wi, curve.facets()),
+        }
+    }
+
+    #[inline(always)]
+    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        match self {
+            Solid(surface) => surface.f_lanes(wi, curve.facets()),
+            Thin(surface) => over_lanes(wi, |w| surface.f::<f32>(w, curve.facets())),
+        }
+    }
+
+    #[inline(always)]
+    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        match self {
+            Solid(surface) => surface.pdf_lanes(wi),
+            Thin(surface) => each_lane(wi, |w| surface.pdf::<f32>(w)),
         }
     }
 

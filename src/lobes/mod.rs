@@ -155,6 +155,16 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L;
 
+    /// [`pdf`](Lobe::pdf) for every lane, the same bits; see [`f_lanes`](Lobe::f_lanes).
+    #[inline(always)]
+    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        each_lane(wi, |w| self.pdf::<f32>(w))
+    }
+
     /// A direction for two uniform numbers in [0, 1).
     fn sample(&self, u: [S; 2]) -> V3<S>;
 
@@ -226,7 +236,7 @@ fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound
 #[inline(always)]
 fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
     let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
-    Evaluated { f: lobe.f_lanes(wi, curve), pdf: each_lane(wi, |w| lobe.pdf(w)), bound }
+    Evaluated { f: lobe.f_lanes(wi, curve), pdf: lobe.pdf_lanes(wi), bound }
 }
 
 /// One number of every lane.
@@ -239,6 +249,20 @@ pub(crate) fn each_lane(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> f32) -> F32x8 {
         out[i] = f(V3::new(x[i], y[i], z[i]));
     }
     F32x8(out)
+}
+
+/// `f` of every lane and of a number that goes with it.
+#[inline(always)]
+pub(crate) fn over_lanes_with(wi: &V3<F32x8>, with: F32x8, f: impl Fn(V3<f32>, f32) -> Rgb<f32>) -> Rgb<F32x8> {
+    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
+    let (F32x8(with), mut out) = (with, [[0.0; F32x8::LANES]; 3]);
+    for i in 0..F32x8::LANES {
+        let value = f(V3::new(x[i], y[i], z[i]), with[i]);
+        for c in 0..3 {
+            out[c][i] = value[c];
+        }
+    }
+    out.map(F32x8)
 }
 
 /// `f` of every lane.

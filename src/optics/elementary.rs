@@ -116,7 +116,7 @@ pub fn floor(x: f32) -> f32 {
 
 /// [`floor`] of a number in [0, 2²²], for less.
 #[inline(always)]
-pub fn whole(x: f32) -> f32 {
+pub(crate) fn whole(x: f32) -> f32 {
     let near = (x + WHOLE) - WHOLE;
     near - if near > x { 1.0 } else { 0.0 }
 }

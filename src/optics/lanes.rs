@@ -56,6 +56,7 @@ impl Real for f64 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
+    #[inline(always)]
     fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
         f(values)
     }
@@ -91,8 +92,15 @@ impl Real for f32 {
         // Not `f32::mul_add`: without the instruction it is a slow library call, and the lanes must agree bit for bit.
         self * a + b
     }
+    #[inline(always)]
     fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
-        f(values.map(f64::from)).map(|x| x as f32)
+        // Not `map`, which is a call.
+        let mut wide = [0.0; N];
+        for (wide, x) in wide.iter_mut().zip(values) {
+            *wide = f64::from(x);
+        }
+        let [x, y, z] = f(wide);
+        [x as f32, y as f32, z as f32]
     }
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {
