@@ -2,7 +2,7 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use overcoat::{Engine, Globals, Material};
+use overcoat::{Engine, Globals, Material, Scratch};
 
 /// Stacks by name, lightest first.
 const STACKS: &[(&str, &str)] = &[
@@ -14,6 +14,11 @@ const STACKS: &[(&str, &str)] = &[
         "surface s() { Ci = color(0.7, 0.5, 0.2) * oren_nayar(N, 0.4); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.4); }",
     ),
     ("sheen_u", "surface s() { Ci = 0.7 * diffuse(N); Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.1 + 0.8 * u); }"),
+    (
+        "sheen_dielectric_oren",
+        "surface s() { Ci = 0.7 * oren_nayar(N, 0.4); Ci = layer(dielectric_bsdf(N, dPdu, 1, 0, 0.3, 0.3, 1.5, \"ggx\"), Ci);
+            Ci = sheen(Ci, N, color(0.3, 0.4, 0.5), 0.4); }",
+    ),
     ("velvet_eon", "surface s() { Ci = layer(0.4 * velvet(N, 0.3), 0.8 * eon(N, color(0.8), 0.5)); }"),
 ];
 
@@ -44,6 +49,17 @@ fn shade_and_flatten(bencher: Bencher, name: &str) {
     let globals = Globals::default();
     bencher
         .bench_local(|| black_box(material.shade(black_box(&globals), black_box(WO.into()))).map(|b| b.lobe_count()));
+}
+
+/// [`shade_and_flatten`] into memory that is used again, as a renderer would.
+#[divan::bench(args = names())]
+fn shade_in(bencher: Bencher, name: &str) {
+    let material = material(name);
+    let (globals, mut scratch) = (Globals::default(), Scratch::new());
+    bencher.bench_local(|| {
+        let bsdf = material.shade_in(black_box(&globals), black_box(WO.into()), &mut scratch);
+        bsdf.map(|b| black_box(b).lobe_count())
+    });
 }
 
 #[divan::bench(args = names())]

@@ -554,7 +554,7 @@ impl<S: Scalar> Baked<S> {
     fn new(program: &Program, layering: Layering, precision: Precision, cache: &TableCache<S>) -> Self {
         let mut curves = Curves::default();
         for (index, site) in program.sites().iter().enumerate() {
-            curves.set_shared(index as u32, site.kind.table(&site.values), precision, cache);
+            curves.prepare(index as u32, site.kind, &site.values, precision, cache);
         }
         let balanced = layering.rule == LayeringRule::Balanced;
         let balance = balanced.then(|| balance(program, layering.tint, &curves, precision));

@@ -109,6 +109,8 @@ pub struct AlbedoCurve<S> {
     extra: Vec<S>,
     cos_nodes: usize,
     rows: usize,
+    /// Cells over the cosine, and over the varying parameter.
+    cells: [S; 2],
     lo: S,
     /// 1/(hi − lo).
     inv_range: S,
@@ -132,6 +134,7 @@ where
             extra: vec![],
             cos_nodes: 0,
             rows: 0,
+            cells: [S::zero(); 2],
             lo: S::zero(),
             inv_range: S::zero(),
             fibre: FibreTables::default(),
@@ -157,6 +160,7 @@ impl<S: Scalar> AlbedoCurve<S> {
             extra: all(&self.extra),
             cos_nodes: self.cos_nodes,
             rows: self.rows,
+            cells: self.cells.map(|n| T::c(n.to_f64())),
             lo: T::c(self.lo.to_f64()),
             inv_range: T::c(self.inv_range.to_f64()),
             fibre: self.fibre.cast(),
@@ -261,23 +265,23 @@ impl<S: Real> AlbedoCurve<S> {
         if table.is_empty() {
             return L::zero();
         }
-        let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * L::c((self.cos_nodes - 1) as f64);
-        let i = x.floor().min(L::c((self.cos_nodes - 2) as f64));
+        if self.rows == 1 {
+            return L::quartic(table, self.cells[0], cos);
+        }
+        let [cells, row_cells] = self.cells.map(L::lift);
+        let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * cells;
+        let i = x.whole().min(cells - L::one());
         let t = x - i;
         let row = |r: L| {
-            let at = r.mul_add(L::c(self.cos_nodes as f64), i);
+            let at = r.mul_add(cells + L::one(), i);
             let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
             (b - a).mul_add(t, a)
         };
-        let value = if self.rows == 1 {
-            row(L::zero())
-        } else {
-            let y = (parameter.safe_sqrt() - L::lift(self.lo)) * L::lift(self.inv_range);
-            let y = y.clamp(L::zero(), L::one()) * L::c((self.rows - 1) as f64);
-            let j = y.floor().min(L::c((self.rows - 2) as f64));
-            let (a, b) = (row(j), row(j + L::one()));
-            (b - a).mul_add(y - j, a)
-        };
+        let y = (parameter.safe_sqrt() - L::lift(self.lo)) * L::lift(self.inv_range);
+        let y = y.clamp(L::zero(), L::one()) * row_cells;
+        let j = y.whole().min(row_cells - L::one());
+        let (a, b) = (row(j), row(j + L::one()));
+        let value = (b - a).mul_add(y - j, a);
         L::select(cos.gt(L::zero()), value, L::zero())
     }
 }
@@ -321,6 +325,7 @@ impl CurveSpec {
             extra: vec![],
             cos_nodes: n,
             rows,
+            cells: [n, rows].map(|n| S::c((n - 1) as f64)),
             lo: S::c(lo),
             inv_range: S::c(1.0 / (hi - lo).max(1e-30)),
             fibre: FibreTables::default(),

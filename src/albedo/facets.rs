@@ -99,10 +99,10 @@ impl<S: Real> FacetTables<S> {
             return S::zero();
         }
         let sheet = if below { self.sheets - 1 } else { 0 };
-        let Rows::Alpha = self.kind else { return S::gather(&self.means, S::c(sheet as f64)) };
-        let row = alpha_row(alpha[0]) * S::c((self.rows - 1) as f64);
-        let j = row.floor().min(S::c((self.rows - 2) as f64));
-        let at = S::c((sheet * self.rows) as f64) + j;
+        let Rows::Alpha = self.kind else { return S::gather(&self.means, count::<S>(sheet)) };
+        let row = alpha_row(alpha[0]) * count::<S>(self.rows - 1);
+        let j = row.whole().min(count::<S>(self.rows - 2));
+        let at = count::<S>(sheet * self.rows) + j;
         let (a, b) = (S::gather(&self.means, at), S::gather(&self.means, at + S::one()));
         (b - a).mul_add(row - j, a)
     }
@@ -144,9 +144,9 @@ impl<S: Real> FacetTables<S> {
 
     #[inline(always)]
     fn place<L: Real + Lift<S>>(&self, w: V3<L>, width: S) -> Place<L> {
-        let last = |n: usize| L::c((n.max(2) - 2) as f64);
-        let x = w.z.abs().min(L::one()).sqrt().sqrt() * L::c((self.nodes - 1) as f64);
-        let i = x.floor().min(last(self.nodes));
+        let last = |n: usize| count::<L>(n.max(2) - 2);
+        let x = w.z.abs().min(L::one()).sqrt().sqrt() * count::<L>(self.nodes - 1);
+        let i = x.whole().min(last(self.nodes));
         let row = match self.kind {
             Rows::One => L::zero(),
             Rows::Azimuth(roots) => {
@@ -155,16 +155,16 @@ impl<S: Real> FacetTables<S> {
             }
             Rows::Alpha => L::lift(alpha_row(width)),
         };
-        let row = row * L::c((self.rows - 1) as f64);
-        let j = row.floor().min(last(self.rows));
-        let below = L::c(((self.sheets - 1) * self.rows * self.nodes) as f64);
+        let row = row * count::<L>(self.rows - 1);
+        let j = row.whole().min(last(self.rows));
+        let below = count::<L>((self.sheets - 1) * self.rows * self.nodes);
         let sheet = L::select(w.z.lt(L::zero()), below, L::zero());
-        Place { start: sheet + j.mul_add(L::c(self.nodes as f64), i), across: x - i, row: row - j }
+        Place { start: sheet + j.mul_add(count::<L>(self.nodes), i), across: x - i, row: row - j }
     }
 
     #[inline(always)]
     fn read<L: Real + Lift<S>>(&self, table: &[S], part: usize, place: Place<L>) -> L {
-        let start = place.start + L::c((part * self.sheets * self.rows * self.nodes) as f64);
+        let start = place.start + count::<L>(part * self.sheets * self.rows * self.nodes);
         let line = |at: L| {
             let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
             (b - a).mul_add(place.across, a)
@@ -173,7 +173,7 @@ impl<S: Real> FacetTables<S> {
         if self.rows == 1 {
             return low;
         }
-        let high = line(start + L::c(self.nodes as f64));
+        let high = line(start + count::<L>(self.nodes));
         (high - low).mul_add(place.row, low)
     }
 }
@@ -225,6 +225,12 @@ impl<S: Scalar> FacetTables<S> {
         let below = (cos.0 < 0.0 && self.sheets == 2).then(|| sheet(-1.0, -cos.1, -cos.0));
         above.into_iter().flatten().chain(below.into_iter().flatten())
     }
+}
+
+/// A number of entries. By way of 32 bits: from 64 to floating point there is no single instruction.
+#[inline(always)]
+fn count<L: Real>(n: usize) -> L {
+    L::c(f64::from(n as u32))
 }
 
 /// The row of a width, in [0, 1].

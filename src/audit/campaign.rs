@@ -14,7 +14,9 @@ use super::furnace::{Albedo, Side, albedo_until};
 use super::script::script;
 use super::trees::{Pool, Recipe};
 use crate::albedo::Precision;
-use crate::closure::{Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, Tables, TintRule, flatten};
+use crate::closure::{
+    Balancer, Bsdf, ClosureTree, Curves, Layering, LayeringRule, TableCache, Tables, TintRule, flatten,
+};
 use crate::engine::Tier;
 use crate::globals::Globals;
 use crate::optics::{Scalar, V3};
@@ -100,7 +102,7 @@ fn generator(seed: u64, stream: u64, number: u64) -> Pcg64Mcg {
 fn bake<S: Scalar>(pool: &Pool, precision: Precision) -> Curves<S> {
     let mut curves = Curves::default();
     for (site, entry) in pool.entries().iter().enumerate() {
-        curves.set(site as u32, entry.kind.table(&entry.known), precision);
+        curves.prepare(site as u32, entry.kind, &entry.known, precision, &TableCache::default());
     }
     curves
 }

@@ -182,7 +182,7 @@ impl Shelf {
         let tree = block.tree(row.lobe, row.setting);
         let mut curves = Curves::default();
         for (site, kind, values) in tree.lobes() {
-            curves.set_shared(site, kind.table(&block.known(site, kind, values)), precision, &self.tables);
+            curves.prepare(site, kind, &block.known(site, kind, values), precision, &self.tables);
         }
         let layering = Layering { rule: row.rule, ..Layering::default() };
         let solve = || Balancer::with_nodes(SCALE_NODES).solve(&tree, &Globals::default(), layering.tint, &curves);

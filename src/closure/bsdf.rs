@@ -5,12 +5,12 @@
 
 use super::balance::Balanced;
 use super::flatten::Layering;
-use super::layer::{LayerStack, LayeringRule, TintRule};
+use super::layer::{FlatStack, LayerStack, LayeringRule, TintRule};
 use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
-use crate::lobes::{AnyLobe, Evaluated, LobeKind, Rgb};
-use crate::optics::{F32x8, Frame, Lift, Real, Scalar, V3, dispatch};
+use crate::lobes::{AnyLobe, Evaluated, Rgb};
+use crate::optics::{Frame, Lift, Real, Scalar, V3};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -56,26 +56,31 @@ pub struct SampleFlags {
 /// One lobe of a flattened tree.
 #[derive(Clone, Debug)]
 pub(crate) struct FlatLobe<'m, S: Real> {
+    /// Its weight from the root of the tree, per channel; then its probability of being chosen by `sample`. In one, because
+    /// f and pdf are worked out side by side.
+    pub share: [S; 4],
     pub lobe: AnyLobe<S>,
     pub curve: &'m AlbedoCurve<S>,
-    pub kind: LobeKind,
     pub site: u32,
     pub frame: u32,
-    /// |N·ωo|.
-    pub cos_o: S,
-    /// From the root of the tree.
-    pub weight: Rgb<S>,
-    /// From the root of the innermost top.
-    pub weight_in_top: Rgb<S>,
+    /// From the root of the innermost top; the fourth is idle.
+    pub weight_in_top: [S; 4],
+    /// α toward ωo of the layer that dims it, where `steps` says that its base begins.
+    pub alpha_o: S,
+    /// What [`FlatStack`] is to do first.
+    pub steps: u8,
     /// Its bound is needed for every ωi.
     pub in_top: bool,
     pub delta: bool,
     /// What it is estimated to scatter for this ωo, weights and layers included.
     pub albedo: Rgb<S>,
-    /// What scales it in place of the layers' own rule, if that was solved for.
-    pub balanced: Option<Balanced<'m, S>>,
+}
+
+impl<S: Real> FlatLobe<'_, S> {
     /// Of being chosen by `sample`.
-    pub probability: S,
+    pub fn probability(&self) -> S {
+        self.share[3]
+    }
 }
 
 /// A layer's α toward ωo and its weight relative to the top it stands in.
@@ -103,9 +108,11 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(super) ng: V3<S>,
     pub(crate) layering: Layering,
     /// The most layers open at once.
-    depth: u16,
+    pub(super) depth: u16,
     pub(crate) ops: SmallVec<[Op; 32]>,
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
+    /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
+    pub(super) balanced: SmallVec<[Option<Balanced<'m, S>>; 8]>,
     pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
@@ -123,6 +130,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             depth: 0,
             ops: SmallVec::new(),
             lobes: SmallVec::new(),
+            balanced: SmallVec::new(),
             layers: SmallVec::new(),
             frames: SmallVec::new(),
             emission: [S::zero(); 3],
@@ -135,23 +143,20 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
         self.ops.clear();
         self.lobes.clear();
+        self.balanced.clear();
         self.layers.clear();
         self.frames.clear();
         self.emission = [S::zero(); 3];
     }
 
     /// Turns estimated albedos into probabilities and drops nothing.
+    #[inline(always)]
     pub(crate) fn finish(&mut self) {
-        let share = |l: &FlatLobe<S>| {
-            let largest = l.albedo[0].max(l.albedo[1]).max(l.albedo[2]).max(S::zero());
-            // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
-            largest.min(S::c(1e30))
-        };
-        let total = self.lobes.iter().map(share).fold(S::zero(), |a, b| a + b);
-        let n = self.lobes.len();
+        // Until now the estimates themselves, by their largest channel.
+        let total = self.lobes.iter().fold(S::zero(), |sum, l| sum + l.share[3]);
+        let even = if total > S::zero() { None } else { Some(S::one() / S::c(self.lobes.len() as f64)) };
         for l in &mut self.lobes {
-            let p = if total > S::zero() { share(l) / total } else { S::one() / S::c(n as f64) };
-            l.probability = p;
+            l.share[3] = even.unwrap_or(l.share[3] / total);
         }
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
         for s in &mut self.signals {
@@ -164,27 +169,29 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// `wi`: world space, unit, away from the surface. A direction that is not finite, or shorter than ½ or longer than
     /// 2, gives black and pdf 0.
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
-        self.eval_each(vector(wi.into()), |_, _| {})
+        self.eval_own(vector(wi.into()), usize::MAX).0
     }
 
-    /// [`eval`](Self::eval), telling `each` the index and the density of every lobe.
+    /// [`eval`](Self::eval), and the density of lobe `own` alone (0 if there is none of that index).
     #[inline(always)]
-    fn eval_each(&self, wi: V3<S>, mut each: impl FnMut(usize, S)) -> Eval<S> {
-        let mut sum = Eval { f_cos: [S::zero(); 3], pdf: S::zero() };
-        self.walk(wi, false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-            let e = l.lobe.evaluate(local, l.curve, bound);
-            sum.add(l, scale, local.z, &e);
-            each(i, e.pdf);
-            e.bound
-        });
-        sum.f_cos = sum.f_cos.map(finite);
-        sum
+    fn eval_own(&self, wi: V3<S>, own: usize) -> (Eval<S>, S) {
+        let mut sum = Sum { all: [S::zero(); 4], own, pdf: S::zero() };
+        if is_unit(wi) {
+            if self.is_flat() {
+                self.walk_flat(wi, &mut sum);
+            } else {
+                self.eval_deep(wi, &mut sum);
+            }
+        }
+        let [r, g, b, pdf] = sum.all;
+        (Eval { f_cos: [finite(r), finite(g), finite(b)], pdf }, sum.pdf)
     }
 
     /// Memory in use: the parts a walk touches, not the room kept for more lobes.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.ops)
             + size_of_val(&*self.lobes)
+            + size_of_val(&*self.balanced)
             + size_of_val(&*self.layers)
             + size_of_val(&*self.frames)
             + 2 * size_of::<V3<S>>()
@@ -215,21 +222,15 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             let wi = frame.to_world(local);
             let f_cos = self.lobe_delta(index, true)?;
             let flags = SampleFlags { transmit: transmit(wi), delta: true, ..SampleFlags::default() };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability }, flags, l, local);
+            return Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local);
         }
         let local = l.lobe.sample([u[0], u[1]]);
         let wi = frame.to_world(local);
         let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
         let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };
-        Self::sampled(wi, self.eval_own(wi, index)?, flags, l, local)
-    }
-
-    /// [`eval`](Self::eval) of a direction that lobe `index` gave. `None` where that lobe's density is 0, as below a
-    /// horizon: another lobe may scatter there, but the sample is not one of its own.
-    fn eval_own(&self, wi: V3<S>, index: usize) -> Option<Eval<S>> {
-        let mut own = S::zero();
-        let eval = self.eval_each(wi, |i, pdf| own = if i == index { pdf } else { own });
-        (own > S::zero()).then_some(eval)
+        // Where the lobe's own density is 0, as below a horizon, another lobe may scatter, but the sample is not one of its own.
+        let (eval, own) = self.eval_own(wi, index);
+        if own > S::zero() { Self::sampled(wi, eval, flags, l, local) } else { None }
     }
 
     /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
@@ -258,12 +259,13 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         let mut rest = u.max(S::zero());
         let mut last = None;
         for (i, l) in self.lobes.iter().enumerate() {
-            if l.probability > S::zero() {
+            let probability = l.probability();
+            if probability > S::zero() {
                 last = Some(i);
-                if rest < l.probability {
+                if rest < probability {
                     return last;
                 }
-                rest -= l.probability;
+                rest -= probability;
             }
         }
         // Rounding may leave a little over.
@@ -304,25 +306,47 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// Never below ∫ f·|cos| over the other direction when one direction is `w`, from either side.
     pub fn albedo_bound(&self, w: [S; 3]) -> Rgb<S> {
-        self.walk(vector(w), true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
+        let w = unit_or_zero(vector(w));
+        self.walk(w, true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
     }
 
-    /// Visits every lobe, then gives the bound on the whole if it is asked for.
+    /// Whether [`walk_flat`](Self::walk_flat) will do: no layers in layers, all channels dimmed alike, nothing solved for.
     #[inline(always)]
-    pub(crate) fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
-        match (self.depth, self.layering.tint) {
-            (0, _) | (1, TintRule::Largest) => self.walk_within::<S, 1, 1>(wi, bound, visit),
-            (2..=4, TintRule::Largest) => self.walk_within::<S, 4, 1>(wi, bound, visit),
-            _ => self.walk_deep(wi, bound, visit),
+    pub(super) fn is_flat(&self) -> bool {
+        self.depth <= 1 && self.layering.tint == TintRule::Largest && self.balanced.is_empty()
+    }
+
+    /// Apart, because its stack is large.
+    #[inline(never)]
+    fn eval_deep(&self, wi: V3<S>, sum: &mut Sum<S>) {
+        self.walk(wi, false, sum);
+    }
+
+    /// [`walk`](Self::walk) for most materials.
+    #[inline(always)]
+    fn walk_flat<L: Real + Lift<S>>(&self, wi: V3<L>, mut visit: impl Visit<'m, S, L>) {
+        let frames = &*self.frames;
+        let mut stack = FlatStack::<L>::default();
+        let (mut frame, mut local) = (u32::MAX, wi);
+        for (index, l) in self.lobes.iter().enumerate() {
+            if l.frame != frame {
+                frame = l.frame;
+                local = frames[frame as usize].to_local(wi);
+            }
+            let scale = stack.step(l.steps, self.layering.rule, L::lift(l.alpha_o));
+            let bound = visit.lobe(index, l, [scale; 3], local, l.in_top);
+            if l.in_top {
+                stack.lobe(l.weight_in_top, bound);
+            }
         }
     }
 
-    /// Apart, because its stack is large: walks that do not need it should not make room for it.
-    #[cold]
-    #[inline(never)]
-    fn walk_deep(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
-        match self.depth {
-            0..=4 => self.walk_within::<S, 4, 3>(wi, bound, visit),
+    /// Visits every lobe, then gives the bound on the whole if it is asked for. `wi` has been looked at: unit or zero.
+    #[inline(always)]
+    pub(crate) fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
+        match (self.depth, self.layering.tint) {
+            (0..=4, TintRule::Largest) => self.walk_within::<S, 4, 1>(wi, bound, visit),
+            (0..=4, _) => self.walk_within::<S, 4, 3>(wi, bound, visit),
             _ => self.walk_within::<S, { MAX_LAYERS as usize }, 3>(wi, bound, visit),
         }
     }
@@ -334,33 +358,34 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         bound: bool,
         mut visit: impl Visit<'m, S, L>,
     ) -> Rgb<L> {
-        let wi = unit_or_zero(wi);
         let mut stack = LayerStack::<L, D, C>::default();
-        let (mut lobe, mut layer) = (0, 0);
+        let (mut index, mut layer) = (0, 0);
         let mut frame = u32::MAX;
         let mut local = wi;
-        for op in &self.ops {
+        let (lobes, layers, frames, balanced) = (&*self.lobes, &*self.layers, &*self.frames, &*self.balanced);
+        for op in &*self.ops {
             match *op {
                 Op::Lobe => {
-                    let l = &self.lobes[lobe];
+                    let l = &lobes[index];
                     if l.frame != frame {
                         frame = l.frame;
-                        local = self.frames[frame as usize].to_local(wi);
+                        local = frames[frame as usize].to_local(wi);
                     }
-                    let scale = match &l.balanced {
-                        Some(balanced) => balanced.scale(local.z),
-                        None => stack.scale(),
+                    let scale = match balanced.get(index) {
+                        Some(Some(balanced)) => balanced.scale(local.z),
+                        _ => stack.scale(),
                     };
                     let asked = l.in_top || bound;
-                    let bound = visit.lobe(lobe, l, scale, local, asked);
+                    let bound = visit.lobe(index, l, scale, local, asked);
                     if asked {
-                        stack.lobe(l.weight_in_top, bound);
+                        let [r, g, b, _] = l.weight_in_top;
+                        stack.lobe([r, g, b], bound);
                     }
-                    lobe += 1;
+                    index += 1;
                 }
                 Op::Begin => stack.begin(),
                 Op::Middle => {
-                    let LayerAlpha { alpha_o, weight } = self.layers[layer];
+                    let LayerAlpha { alpha_o, weight } = layers[layer];
                     layer += 1;
                     stack.middle(weight, self.layering.rule, self.layering.tint, Some(alpha_o));
                 }
@@ -373,21 +398,6 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Whether every layer scales symmetrically in its directions.
     pub fn symmetric_layers(&self) -> bool {
         self.layers.is_empty() || self.layering.rule != LayeringRule::View
-    }
-}
-
-impl<'m> Bsdf<'m, f32> {
-    /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are. Like a
-    /// `zip` it ends with the shorter of the two slices.
-    pub fn eval_batch(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
-        let count = wi.len().min(out.len());
-        let (wi, out) = (&wi[..count], &mut out[..count]);
-        // Rare trees are not worth code of their own.
-        if usize::from(self.depth) <= DEPTH_IN_LANES && self.layering.tint == TintRule::Largest {
-            dispatch::widest(Batch { bsdf: self, wi, out });
-        } else {
-            out.iter_mut().zip(wi).for_each(|(out, wi)| *out = self.eval(*wi));
-        }
     }
 }
 
@@ -404,69 +414,39 @@ impl<'m, S: Real, L, F: FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>, bool) -> R
     }
 }
 
-/// Adds up lanes; no closure, because those cannot be told to be inlined.
-impl<'m> Visit<'m, f32, F32x8> for &mut Eval<F32x8> {
+/// Adds up f·|cos| and the pdf; no closure, because those cannot be told to be inlined.
+struct Sum<S> {
+    /// Three channels of f·|cos|, then the pdf.
+    all: [S; 4],
+    /// A lobe's index, and its density once met.
+    own: usize,
+    pdf: S,
+}
+
+impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
     #[inline(always)]
-    fn lobe(
-        &mut self,
-        _: usize,
-        l: &FlatLobe<'m, f32>,
-        scale: Rgb<F32x8>,
-        local: V3<F32x8>,
-        bound: bool,
-    ) -> Rgb<F32x8> {
-        let e = l.lobe.evaluate_lanes(&local, l.curve, bound);
-        self.add(l, scale, local.z, &e);
+    fn lobe(&mut self, index: usize, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound: bool) -> Rgb<S> {
+        let e = l.lobe.evaluate(local, l.curve, bound);
+        add(&mut self.all, l, scale, local.z, &e);
+        self.pdf = if index == self.own { e.pdf } else { self.pdf };
         e.bound
     }
 }
 
-/// How many layers may be open at once for directions to be worked on side by side.
-const DEPTH_IN_LANES: usize = 4;
-
-/// The work of [`Bsdf::eval_batch`], compiled for each instruction set that is chosen from at run time.
-struct Batch<'a, 'm> {
-    bsdf: &'a Bsdf<'m>,
-    wi: &'a [[f32; 3]],
-    out: &'a mut [Eval],
-}
-
-impl dispatch::Work for Batch<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Batch { bsdf, wi, out } = self;
-        for (wi, out) in wi.chunks(F32x8::LANES).zip(out.chunks_mut(F32x8::LANES)) {
-            let mut block = [[0.0; F32x8::LANES]; 3];
-            for (i, w) in wi.iter().enumerate() {
-                for c in 0..3 {
-                    block[c][i] = w[c];
-                }
-            }
-            let [x, y, z] = block.map(F32x8);
-            let mut sum = Eval { f_cos: [F32x8::zero(); 3], pdf: F32x8::zero() };
-            bsdf.walk_within::<F32x8, DEPTH_IN_LANES, 1>(V3::new(x, y, z), false, &mut sum);
-            sum.f_cos = sum.f_cos.map(finite);
-            for i in 0..wi.len() {
-                out[i] = Eval { f_cos: sum.f_cos.map(|f| f.0[i]), pdf: sum.pdf.0[i] };
-            }
-        }
-    }
-}
-
-impl<L: Real> Eval<L> {
-    /// Adds one lobe, scaled by what lies above it.
-    #[inline(always)]
-    fn add<S: Scalar>(&mut self, l: &FlatLobe<'_, S>, scale: Rgb<L>, cos: L, e: &Evaluated<L>)
-    where
-        L: Lift<S>,
-    {
-        let cos = cos.abs().min(L::one());
-        for c in 0..3 {
-            self.f_cos[c] += L::lift(l.weight[c]) * scale[c] * e.f[c] * cos;
-        }
-        self.pdf = L::lift(l.probability).mul_add(e.pdf, self.pdf);
+/// Adds f·|cos| per channel and the pdf of one lobe, scaled by what lies above it.
+#[inline(always)]
+pub(super) fn add<S: Scalar, L: Real + Lift<S>>(
+    sum: &mut [L; 4],
+    l: &FlatLobe<'_, S>,
+    scale: Rgb<L>,
+    cos: L,
+    e: &Evaluated<L>,
+) {
+    let cos = cos.abs().min(L::one());
+    let values = [e.f[0], e.f[1], e.f[2], e.pdf];
+    let scales = [scale[0] * cos, scale[1] * cos, scale[2] * cos, L::one()];
+    for k in 0..4 {
+        sum[k] += L::lift(l.share[k]) * values[k] * scales[k];
     }
 }
 
@@ -480,15 +460,22 @@ impl<S: Scalar> FlatLobe<'_, S> {
 /// A million terms of weight 1e30 are still a number.
 #[inline(always)]
 pub(super) fn finite<L: Real>(x: L) -> L {
-    x.min(L::c(f32::MAX as f64))
+    let most = L::c(f32::MAX as f64);
+    L::select(x.lt(most), x, most)
 }
 
 /// Directions that are not finite, or far from unit length, become zero: in every surface at once, hence black.
 #[inline(always)]
-fn unit_or_zero<L: Real>(w: V3<L>) -> V3<L> {
-    let length = w.length_squared();
-    let fine = length.gt(L::c(0.25)) & length.lt(L::c(4.0));
+pub(super) fn unit_or_zero<L: Real>(w: V3<L>) -> V3<L> {
+    let fine = is_unit(w);
     w.map(|x| L::select(fine, x, L::zero()))
+}
+
+/// Whether a direction is finite and about as long as it should be.
+#[inline(always)]
+fn is_unit<L: Real>(w: V3<L>) -> L::Mask {
+    let length = w.length_squared();
+    length.gt(L::c(0.25)) & length.lt(L::c(4.0))
 }
 
 #[inline(always)]

@@ -374,7 +374,7 @@ impl Builder {
             for (at, count, _) in &site.open {
                 known[*at as usize..(at + count) as usize].fill(None);
             }
-            curves.set_shared(index as u32, site.kind.table(&known), self.precision, &self.cache);
+            curves.prepare(index as u32, site.kind, &known, self.precision, &self.cache);
         }
         let Builder { id, layering, precision, steps, sites, inputs, .. } = self;
         let plan = Plan { id, layering, steps, sites, inputs, root, curves, balance: None };

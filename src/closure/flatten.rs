@@ -5,9 +5,10 @@
 
 use super::balance::{Balance, Chain};
 use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
-use super::layer::{LayerStack, LayeringRule, TintRule};
+use super::layer::{LayerStack, LayeringRule, TintRule, step};
+use super::sites::Site;
 use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
-use super::walk::{self, LobeVisit, Visitor, Weights, directions, walk};
+use super::walk::{self, LobeVisit, Visitor, Weights, directions, first, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
@@ -48,9 +49,17 @@ impl<S: Scalar> TableCache<S> {
 #[derive(Clone, Debug, Default)]
 pub struct Curves<S: Scalar> {
     baked: Vec<(TableSpec, Arc<AlbedoCurve<S>>)>,
-    /// Index into `baked` per site.
-    sites: Vec<Option<u32>>,
+    /// By number.
+    sites: Vec<Known<S>>,
     none: AlbedoCurve<S>,
+}
+
+/// What is known of a site before shading.
+#[derive(Clone, Debug, Default)]
+struct Known<S: Scalar> {
+    /// One of those baked.
+    curve: Option<Arc<AlbedoCurve<S>>>,
+    lobe: Option<Site<S>>,
 }
 
 impl<S: Scalar> Curves<S> {
@@ -59,7 +68,7 @@ impl<S: Scalar> Curves<S> {
         let mut curves = Curves::default();
         for (site, kind, values) in tree.lobes() {
             let known: Vec<Option<f32>> = values.iter().map(|v| Some(*v)).collect();
-            curves.set(site, kind.table(&known), precision);
+            curves.prepare(site, kind, &known, precision, &TableCache::default());
         }
         curves
     }
@@ -71,11 +80,16 @@ impl<S: Scalar> Curves<S> {
 
     /// The same tables in another type, rounded to double precision.
     pub fn cast<T: Scalar>(&self) -> Curves<T> {
-        Curves {
-            baked: self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect(),
-            sites: self.sites.clone(),
-            none: AlbedoCurve::default(),
-        }
+        let baked: Vec<_> = self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect();
+        let none = AlbedoCurve::default();
+        let known = |site: &Known<S>| {
+            let same = |own: &Arc<AlbedoCurve<S>>| self.baked.iter().position(|(_, c)| Arc::ptr_eq(c, own));
+            let curve: Option<Arc<AlbedoCurve<T>>> = site.curve.as_ref().and_then(same).map(|i| baked[i].1.clone());
+            let lobe = site.lobe.as_ref().and_then(|l| l.cast(curve.as_deref().unwrap_or(&none)));
+            Known { curve, lobe }
+        };
+        let sites = self.sites.iter().map(known).collect();
+        Curves { baked, sites, none }
     }
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
@@ -93,10 +107,28 @@ impl<S: Scalar> Curves<S> {
                 self.baked.len() - 1
             }
         };
-        if self.sites.len() <= site as usize {
-            self.sites.resize(site as usize + 1, None);
-        }
-        self.sites[site as usize] = Some(index as u32);
+        let curve = self.baked[index].1.clone();
+        *self.known(site) = Known { curve: Some(curve), lobe: None };
+    }
+
+    /// [`set_shared`](Self::set_shared) with the table of a lobe whose parameter block is known as far as `known` says,
+    /// and all else that can be worked out before shading.
+    pub(crate) fn prepare(
+        &mut self,
+        site: u32,
+        kind: LobeKind,
+        known: &[Option<f32>],
+        precision: Precision,
+        cache: &TableCache<S>,
+    ) {
+        self.set_shared(site, kind.table(known), precision, cache);
+        self.known(site).lobe = Site::new(kind, known, self.of(site));
+    }
+
+    fn known(&mut self, site: u32) -> &mut Known<S> {
+        let count = self.sites.len().max(site as usize + 1);
+        self.sites.resize(count, Known::default());
+        &mut self.sites[site as usize]
     }
 
     /// Memory the tables take.
@@ -105,9 +137,14 @@ impl<S: Scalar> Curves<S> {
     }
 
     pub(super) fn of(&self, site: u32) -> &AlbedoCurve<S> {
+        self.at(site).0
+    }
+
+    /// The curve of a site and what else is known of it.
+    fn at(&self, site: u32) -> (&AlbedoCurve<S>, Option<&Site<S>>) {
         match self.sites.get(site as usize) {
-            Some(Some(index)) => &self.baked[*index as usize].1,
-            _ => &self.none,
+            Some(Known { curve, lobe }) => (curve.as_deref().unwrap_or(&self.none), lobe.as_ref()),
+            None => (&self.none, None),
         }
     }
 }
@@ -174,7 +211,8 @@ pub fn flatten_into<'m, S: Scalar>(
     tree.within_budget()?;
     let tables = tables.into();
     match layers {
-        0..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
+        0..=1 => walk(tree, &mut Flattener::<S, 1>::new(globals, tables, bsdf)),
+        2..=4 => walk(tree, &mut Flattener::<S, 4>::new(globals, tables, bsdf)),
         _ => flatten_deep(tree, globals, tables, bsdf),
     }
     bsdf.finish();
@@ -197,18 +235,42 @@ struct Flattener<'b, 'm, S: Scalar, const D: usize> {
     stack: LayerStack<S, D>,
     /// What lies above, for balancing.
     chain: Chain<S>,
+    /// What comes before the next lobe, as far as one layer goes, and α toward ωo of the last layer.
+    steps: u8,
+    alpha_o: S,
     /// Lobes met so far, whether they count or not.
     met: usize,
-    /// Normal and tangent as the tree gave them, per frame.
-    frame_keys: SmallVec<[(Vec3, Vec3); 8]>,
+    /// One per frame.
+    standing: SmallVec<[Standing<S>; 8]>,
+}
+
+/// How ωo stands in a frame.
+#[derive(Clone, Copy)]
+struct Standing<S> {
+    /// Normal and tangent as the tree gave them.
+    key: (Vec3, Vec3),
+    normal: V3<S>,
+    /// In the frame.
+    wo: V3<S>,
 }
 
 impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
     fn new(globals: &'b Globals, tables: Tables<'m, S>, bsdf: &'b mut Bsdf<'m, S>) -> Self {
         let balance = tables.balance.filter(|_| bsdf.layering.rule == LayeringRule::Balanced);
         let (stack, chain) = (LayerStack::default(), Chain::default());
-        let frame_keys = SmallVec::new();
-        Flattener { globals, curves: tables.curves, balance, bsdf, stack, chain, met: 0, frame_keys }
+        let standing = SmallVec::new();
+        Flattener {
+            globals,
+            curves: tables.curves,
+            balance,
+            bsdf,
+            stack,
+            chain,
+            steps: step::NONE,
+            alpha_o: S::one(),
+            met: 0,
+            standing,
+        }
     }
 
     fn chained(&mut self, f: impl FnOnce(&mut Chain<S>)) {
@@ -221,12 +283,27 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
     fn frame(&mut self, kind: LobeKind, values: &[f32]) -> u32 {
         let (n, t) = directions(kind, values, self.globals);
         let same = |a: Vec3, b: Vec3| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits);
-        if let Some(i) = self.frame_keys.iter().position(|k| same(k.0, n) && same(k.1, t)) {
+        if let Some(i) = self.standing.iter().position(|s| same(s.key.0, n) && same(s.key.1, t)) {
             return i as u32;
         }
-        self.frame_keys.push((n, t));
-        self.bsdf.frames.push(walk::frame((n, t), self.globals));
-        self.frame_keys.len() as u32 - 1
+        let frame = walk::frame((n, t), self.globals);
+        self.standing.push(Standing { key: (n, t), normal: frame.n, wo: frame.to_local(self.bsdf.wo) });
+        self.bsdf.frames.push(frame);
+        self.standing.len() as u32 - 1
+    }
+
+    /// The lobe just made is no lobe: it gives off light, or tells the renderer something.
+    #[cold]
+    fn emission(&mut self, w: Weights<S>, scale: Rgb<S>) {
+        let Some(l) = self.bsdf.lobes.pop() else { return };
+        let value = std::array::from_fn(|c| w.total[c] * scale[c]);
+        if let AnyLobe::Emission(emission) = l.lobe {
+            for c in 0..3 {
+                self.bsdf.emission[c] += value[c] * emission.radiance();
+            }
+        } else if let Some(kind) = SignalKind::of(&l.lobe) {
+            self.bsdf.signal(kind, value);
+        }
     }
 }
 
@@ -234,77 +311,87 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn begin(&mut self) {
         self.stack.begin();
         self.chained(Chain::begin);
+        self.steps = step::BEGIN | step::CLEAR;
         self.bsdf.ops.push(Op::Begin);
     }
 
     fn middle(&mut self, w: Weights<S>) {
         let Layering { rule, tint } = self.bsdf.layering;
-        let alpha = self.stack.middle(w.in_top, rule, tint, None::<Rgb<S>>);
+        let weight = first(w.in_top);
+        let alpha = self.stack.middle(weight, rule, tint, None::<Rgb<S>>);
         self.chained(Chain::middle);
-        self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight: w.in_top });
+        // Where the top came to nothing, what bounded the one before must go.
+        self.steps = step::MIDDLE | (self.steps & step::BEGIN);
+        self.alpha_o = alpha[0];
+        self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight });
         self.bsdf.ops.push(Op::Middle);
     }
 
     fn end(&mut self) {
         self.stack.end();
         self.chained(Chain::end);
+        self.steps = step::CLEAR;
         self.bsdf.ops.push(Op::End);
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
+        let (curve, known) = self.curves.at(visit.site);
+        let known = known.filter(|k| k.is_of(visit.kind, visit.values));
+        let visit = match known {
+            Some(known) => LobeVisit { weights: known.tinted(visit.weights), ..visit },
+            None => visit.tinted(),
+        };
         let LobeVisit { kind, site, values, weights: w } = visit;
         let met = self.met;
         self.met += 1;
-        if w.total.iter().all(|w| *w <= S::zero()) && !w.inside {
+        if first(w.total).iter().all(|w| *w <= S::zero()) && !w.inside {
             return;
         }
         let frame = self.frame(kind, values);
-        let curve = self.curves.of(site);
-        let normal = self.bsdf.frames[frame as usize].n;
-        let wo = self.bsdf.frames[frame as usize].to_local(self.bsdf.wo);
+        let Standing { normal, wo, .. } = self.standing[frame as usize];
         let scale = self.stack.scale();
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
-        let lobes = &mut self.bsdf.lobes;
-        // Made where it stays, because it is large.
-        lobes.push(FlatLobe {
-            lobe: AnyLobe::new(kind, values, wo, curve),
+        let class = kind.class();
+        self.bsdf.lobes.push(FlatLobe {
+            share: w.total,
+            lobe: AnyLobe::nothing(),
             curve,
-            kind,
             site,
             frame,
-            cos_o: wo.z.abs().min(S::one()),
-            weight: w.total,
             weight_in_top: w.in_top,
+            alpha_o: self.alpha_o,
+            steps: self.steps,
             in_top: w.inside && !view,
-            delta: kind.class() == LobeClass::Delta,
+            delta: class == LobeClass::Delta,
             albedo: [S::zero(); 3],
-            balanced,
-            probability: S::zero(),
         });
-        let Some(l) = lobes.last_mut() else { return };
-        if let AnyLobe::Emission(emission) = l.lobe {
-            for c in 0..3 {
-                self.bsdf.emission[c] += w.total[c] * scale[c] * emission.radiance();
-            }
-            lobes.pop();
+        let Some(l) = self.bsdf.lobes.last_mut() else { return };
+        // Made where it stays, because there is room for the largest.
+        if !known.is_some_and(|k| k.turn(wo, curve, &mut l.lobe)) {
+            l.lobe = AnyLobe::new(kind, values, wo, curve);
+        }
+        if class == LobeClass::Emission {
+            self.emission(w, scale);
             return;
         }
-        if let Some(kind) = SignalKind::of(&l.lobe) {
-            lobes.pop();
-            self.bsdf.signal(kind, std::array::from_fn(|c| w.total[c] * scale[c]));
-            return;
-        }
-        let albedo = l.lobe.albedo(wo, curve);
+        let [albedo, bound] = l.lobe.albedos(wo, curve, w.inside && !view);
         l.albedo = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
+        let largest = l.albedo[0].max(l.albedo[1]).max(l.albedo[2]).max(S::zero());
+        // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
+        l.share[3] = largest.min(S::c(1e30));
         if w.inside {
-            let bound = if view { l.lobe.view_bound(wo, curve) } else { l.lobe.albedo_bound(wo, curve) };
-            self.stack.lobe(w.in_top, bound);
+            let bound = if view { l.lobe.view_bound(wo, curve) } else { bound };
+            self.stack.lobe(first(w.in_top), bound);
         }
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
             self.chained(|chain| chain.lobe(&visit, normal, param));
         }
+        if self.balance.is_some() {
+            self.bsdf.balanced.push(balanced);
+        }
+        self.steps = step::NONE;
         self.bsdf.ops.push(Op::Lobe);
     }
 }

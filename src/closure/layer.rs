@@ -45,7 +45,11 @@ pub enum TintRule {
 pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
     let pass = |e: L| (L::one() - e).clamp(L::zero(), L::one());
     match tint {
-        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); C],
+        TintRule::Largest => {
+            // Not `max`, which looks out for NaN: that passes nothing either way.
+            let larger = |a: L, b: L| L::select(a.gt(b), a, b);
+            [pass(larger(larger(bound[0], bound[1]), bound[2])); C]
+        }
         TintRule::Channel => std::array::from_fn(|c| pass(bound[c])),
     }
 }
@@ -57,6 +61,66 @@ pub fn scale<L: Real, const C: usize>(rule: LayeringRule, alpha_o: [L; C], alpha
         // What was solved for takes the place of this.
         LayeringRule::Min | LayeringRule::Balanced => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
         LayeringRule::View => alpha_o,
+    }
+}
+
+/// What stands before a lobe in a tree without layers in layers: bits of [`FlatStack`]'s steps.
+pub(crate) mod step {
+    /// Nothing new.
+    pub const NONE: u8 = 0;
+    /// A top begins.
+    pub const BEGIN: u8 = 1;
+    /// A base begins.
+    pub const MIDDLE: u8 = 2;
+    /// No layer dims what follows.
+    pub const CLEAR: u8 = 4;
+}
+
+/// [`LayerStack`] for trees without layers in layers, all channels dimmed alike: the same numbers for less.
+pub(crate) struct FlatStack<L> {
+    /// Bound on the albedo of the top being walked, so far; the fourth is idle, but four go as one.
+    bound: [L; 4],
+    scale: L,
+}
+
+impl<L: Real> Default for FlatStack<L> {
+    /// Outside of any layer.
+    #[inline(always)]
+    fn default() -> Self {
+        FlatStack { bound: [L::zero(); 4], scale: L::one() }
+    }
+}
+
+impl<L: Real> FlatStack<L> {
+    /// Takes the steps before a lobe. `alpha_o` is α toward ωo of the layer whose base begins. Returns the lobe's scale.
+    #[inline(always)]
+    pub fn step(&mut self, steps: u8, rule: LayeringRule, alpha_o: L) -> L {
+        if steps != step::NONE {
+            if steps & step::BEGIN != 0 {
+                self.bound = [L::zero(); 4];
+            }
+            if steps & step::MIDDLE != 0 {
+                let [r, g, b, _] = self.bound;
+                let alpha_i: [L; 1] = alpha(TintRule::Largest, [r, g, b]);
+                [self.scale] = scale(rule, [alpha_o], alpha_i);
+            }
+            if steps & step::CLEAR != 0 {
+                self.scale = L::one();
+            }
+        }
+        self.scale
+    }
+
+    /// A lobe of a top: see [`LayerStack::lobe`].
+    #[inline(always)]
+    pub fn lobe<S: Real>(&mut self, weight: [S; 4], bound: Rgb<L>)
+    where
+        L: Lift<S>,
+    {
+        let bound = [bound[0], bound[1], bound[2], bound[2]];
+        for c in 0..4 {
+            self.bound[c] = L::lift(weight[c]).mul_add(bound[c], self.bound[c]);
+        }
     }
 }
 
@@ -121,13 +185,23 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
         }
     }
 
+    /// What was set aside when the innermost open layer began.
+    #[inline(always)]
+    fn outer(&mut self) -> &mut Saved<L, C> {
+        // Where one layer is the most, the compiler is told: all this then stays in registers.
+        &mut self.saved[if D == 1 { 0 } else { self.open - 1 }]
+    }
+
     /// A layer begins, its top first.
     #[inline(always)]
     pub fn begin(&mut self) {
-        self.saved[self.open] = Saved { bound: self.bound, path: self.path, scale: self.scale };
         self.open += 1;
+        // The only layer stands in no other, so that nothing dims it.
+        let ([path, scale], one) = ([self.path, self.scale], [L::one(); C]);
+        let [path, scale] = if D == 1 { [one; 2] } else { [path, scale] };
+        *self.outer() = Saved { bound: self.bound, path, scale };
         self.bound = [L::zero(); 3];
-        self.path = [L::one(); C];
+        self.path = one;
     }
 
     /// The top is complete, the base follows. `weight` is the layer's own weight relative to the top it stands in;
@@ -148,7 +222,7 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
         let passed = if rule == LayeringRule::View && alpha_o.is_some() { [L::one(); C] } else { alpha };
         let toward_viewer = alpha_o.map_or(alpha, |a| std::array::from_fn(|c| L::lift(a[c])));
         let s = scale(rule, toward_viewer, alpha);
-        let outer = &self.saved[self.open - 1];
+        let outer = *self.outer();
         for c in 0..3 {
             // Bound of a layer as part of a top: Ē_t + α·Ē_b, per channel.
             self.bound[c] = (L::lift(weight[c]) * outer.path[c % C]).mul_add(self.bound[c], outer.bound[c]);
@@ -163,8 +237,8 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
     /// The layer is complete.
     #[inline(always)]
     pub fn end(&mut self) {
+        let Saved { path, scale, .. } = *self.outer();
+        (self.path, self.scale) = (path, scale);
         self.open -= 1;
-        self.path = self.saved[self.open].path;
-        self.scale = self.saved[self.open].scale;
     }
 }

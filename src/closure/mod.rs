@@ -1,6 +1,7 @@
 //! From a closure tree to a BSDF. Never sees a script: trees come from the interpreter or from code.
 
 pub mod balance;
+mod batch;
 pub mod bsdf;
 pub mod builder;
 pub mod flatten;
@@ -8,6 +9,7 @@ pub mod layer;
 pub mod parts;
 pub mod query;
 mod scratch;
+mod sites;
 pub mod tree;
 mod walk;
 

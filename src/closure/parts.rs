@@ -1,6 +1,6 @@
 //! A BSDF lobe by lobe: what audits integrate, and what a material asks of the renderer beside scattering.
 
-use super::bsdf::{Bsdf, FlatLobe, finite};
+use super::bsdf::{Bsdf, FlatLobe, finite, unit_or_zero};
 use crate::lobes::signals::SignalKind;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
 use crate::optics::{Frame, Scalar, V3};
@@ -86,7 +86,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// `None` for delta lobes, where it scatters nothing that way, and for lobes that do not count.
     pub(crate) fn lobe_sample(&self, index: usize, u: [S; 2]) -> Option<(V3<S>, S)> {
         let l = &self.lobes[index];
-        if l.delta || l.probability <= S::zero() {
+        if l.delta || l.probability() <= S::zero() {
             return None;
         }
         let local = l.lobe.sample(u);
@@ -109,16 +109,16 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                 l.bound(local, bound)
             });
         }
-        Some(std::array::from_fn(|c| l.weight[c] * scale[c] * part[c]))
+        Some(std::array::from_fn(|c| l.share[c] * scale[c] * part[c]))
     }
 
     /// w·f·|cos θi| of lobe `index` alone, with or without the layers above it.
     pub(crate) fn lobe_part(&self, index: usize, wi: V3<S>, layered: bool) -> Rgb<S> {
         let mut result = [S::zero(); 3];
-        self.walk(wi, false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+        self.walk(unit_or_zero(wi), false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
             if i == index {
                 let scale = if layered { scale } else { [S::one(); 3] };
-                result = weighted(l, scale, local, Cosine::Light);
+                result = weighted(l, scale, local, Cosine::Light, self.cos_o(l));
             }
             l.bound(local, bound)
         });
@@ -128,9 +128,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Like `eval`, its cosine chosen, with only the lobes whose frame and kind `pick` accepts.
     pub(crate) fn part(&self, wi: V3<S>, cosine: Cosine, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
         let mut sum = [S::zero(); 3];
-        self.walk(wi, false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-            if pick(&self.frames[l.frame as usize], l.kind) {
-                let part = weighted(l, scale, local, cosine);
+        self.walk(unit_or_zero(wi), false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+            if pick(&self.frames[l.frame as usize], l.lobe.kind()) {
+                let part = weighted(l, scale, local, cosine, self.cos_o(l));
                 for c in 0..3 {
                     sum[c] += part[c];
                 }
@@ -138,6 +138,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             l.bound(local, bound)
         });
         sum.map(finite)
+    }
+
+    /// |N·ωo| of a lobe.
+    fn cos_o(&self, l: &FlatLobe<'m, S>) -> S {
+        self.frames[l.frame as usize].n.dot(self.wo).abs().min(S::one())
     }
 
     /// The frames in use, one per distinct normal and tangent.
@@ -152,16 +157,16 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// What lobe `index` is, and the place in the program that made it.
     pub fn lobe_kind(&self, index: usize) -> (LobeKind, u32) {
-        (self.lobes[index].kind, self.lobes[index].site)
+        (self.lobes[index].lobe.kind(), self.lobes[index].site)
     }
 }
 
-fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine) -> Rgb<S> {
+fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine, cos_o: S) -> Rgb<S> {
     let f = l.lobe.f(local, l.curve);
     let cos = match cosine {
         Cosine::Light => local.z.abs().min(S::one()),
-        Cosine::View => l.cos_o * l.lobe.relative_eta(local).sq(),
+        Cosine::View => cos_o * l.lobe.relative_eta(local).sq(),
         Cosine::None => l.lobe.relative_eta(local),
     };
-    std::array::from_fn(|c| l.weight[c] * scale[c] * f[c] * cos)
+    std::array::from_fn(|c| l.share[c] * scale[c] * f[c] * cos)
 }

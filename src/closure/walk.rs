@@ -4,29 +4,37 @@
 
 use super::tree::{ClosureTree, MAX_WEIGHT, Node, NodeId};
 use crate::globals::Globals;
-use crate::lobes::{LobeKind, Rgb};
+use crate::lobes::{LobeKind, Rgb, Rgb32};
 use crate::optics::{Frame, Scalar, V3};
 use glam::Vec3;
 use smallvec::SmallVec;
 
-/// Weights along the way from the root to a node.
+/// Weights along the way from the root to a node: three channels and an idle one, because four go as one.
 #[derive(Clone, Copy)]
 pub(super) struct Weights<S> {
     /// From the root.
-    pub total: Rgb<S>,
+    pub total: [S; 4],
     /// From the root of the innermost top the node stands in.
-    pub in_top: Rgb<S>,
+    pub in_top: [S; 4],
     /// Whether it stands in a top at all.
     pub inside: bool,
 }
 
 impl<S: Scalar> Weights<S> {
     /// Products of weights stay below the largest weight, as each of them does.
-    pub fn times(self, weight: Rgb<S>) -> Self {
-        let limit = S::c(MAX_WEIGHT as f64);
-        let product = |a: Rgb<S>| std::array::from_fn(|c| (a[c] * weight[c]).min(limit));
+    #[inline(always)]
+    pub fn times(self, [r, g, b]: Rgb32) -> Self {
+        let (weight, limit) = ([r, g, b, b].map(S::from_f32), S::c(MAX_WEIGHT as f64));
+        let kept = |x: S| S::select(x.lt(limit), x, limit);
+        let product = |a: [S; 4]| std::array::from_fn(|c| kept(a[c] * weight[c]));
         Weights { total: product(self.total), in_top: product(self.in_top), inside: self.inside }
     }
+}
+
+/// The three channels.
+#[inline(always)]
+pub(super) fn first<S: Copy>([r, g, b, _]: [S; 4]) -> Rgb<S> {
+    [r, g, b]
 }
 
 /// A lobe on the way.
@@ -36,8 +44,15 @@ pub(super) struct LobeVisit<'t, S> {
     pub site: u32,
     /// Its parameter block.
     pub values: &'t [f32],
-    /// The lobe's own color included.
+    /// The lobe's own color is not among them.
     pub weights: Weights<S>,
+}
+
+impl<S: Scalar> LobeVisit<'_, S> {
+    /// With the lobe's own color, [`LobeKind::weight`], among the weights.
+    pub fn tinted(self) -> Self {
+        LobeVisit { weights: self.weights.times(self.kind.weight(self.values)), ..self }
+    }
 }
 
 /// What is done along the way.
@@ -60,7 +75,7 @@ enum Step<S> {
 
 /// Takes `visitor` through the tree.
 pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>) {
-    let one = [S::one(); 3];
+    let one = [S::one(); 4];
     let mut steps: SmallVec<[Step<S>; 24]> = SmallVec::new();
     let mut next = Some((tree.root(), Weights { total: one, in_top: one, inside: false }));
     loop {
@@ -72,7 +87,7 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
                     steps.push(Step::Visit(b, w));
                     next = Some((a, w));
                 }
-                Node::Mul(weight, c) => next = Some((c, w.times(weight.map(S::from_f32)))),
+                Node::Mul(weight, c) => next = Some((c, w.times(weight))),
                 Node::Layer { top, base } => {
                     steps.push(Step::End);
                     steps.push(Step::Visit(base, w));
@@ -82,8 +97,7 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
                 }
                 Node::Lobe { kind, site, slots } => {
                     let values = tree.values(kind, slots);
-                    let weights = w.times(kind.weight(values).map(S::from_f32));
-                    visitor.lobe(LobeVisit { kind, site, values, weights });
+                    visitor.lobe(LobeVisit { kind, site, values, weights: w });
                 }
             }
         }

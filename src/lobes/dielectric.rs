@@ -16,10 +16,10 @@ use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
-use super::{Lobe, Rgb, Sides};
+use super::{Lobe, Rgb, Sides, each_lane, over_lanes};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{F32x8, Lift, Real, V3};
 
 closure! {
     /// Reflection and refraction between two media, what bounces between the facets included. Two-sided.
@@ -124,11 +124,42 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+        match self {
+            Solid(surface) => Some(Solid(surface.toward(wo, curve.facets()))),
+            Thin(_) => None,
+        }
+    }
+
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         match self {
             Solid(surface) => surface.f(wi, curve.facets()),
             Thin(surface) => surface.f(wi, curve.facets()),
+        }
+    }
+
+    #[inline(always)]
+    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        match self {
+            Solid(surface) => surface.f_lanes(wi, curve.facets()),
+            Thin(surface) => over_lanes(wi, |w| surface.f::<f32>(w, curve.facets())),
+        }
+    }
+
+    #[inline(always)]
+    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        match self {
+            Solid(surface) => surface.pdf_lanes(wi),
+            Thin(surface) => each_lane(wi, |w| surface.pdf::<f32>(w)),
         }
     }
 

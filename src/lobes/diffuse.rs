@@ -24,6 +24,13 @@ pub struct Diffuse<S> {
     value: S,
 }
 
+impl<S: Real> Diffuse<S> {
+    /// Scatters nothing.
+    pub(super) fn black() -> Self {
+        Diffuse { value: S::zero() }
+    }
+}
+
 impl<S: Real> Lobe<S> for Diffuse<S> {
     type Params = DiffuseParams;
 
@@ -35,10 +42,17 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) }
     }
 
+    #[inline(always)]
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+        Some(Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) })
+    }
+
+    #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         [L::select(wi.z.gt(L::zero()), L::lift(self.value), L::zero()); 3]
     }
 
+    #[inline(always)]
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
@@ -47,10 +61,12 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         sampling::cosine_hemisphere(u)
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
         [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
     }
 
+    #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         [L::select(w.z.gt(L::zero()), L::one(), L::zero()); 3]
     }

@@ -8,7 +8,7 @@
 //! that is too low is not found out here, but by the audits.
 
 use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
-use super::{LobeKind, Rgb, Rgb32, Sides};
+use super::{Evaluated, LobeKind, Rgb, Rgb32, Sides};
 use crate::optics::{Lift, Real, V3, sampling};
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -332,6 +332,17 @@ impl<S: Real> Host<S> {
 }
 
 impl<S: Real> Host<S> {
+    /// What it is.
+    pub(super) fn kind(&self) -> HostKind {
+        self.kind
+    }
+
+    #[inline(never)]
+    pub(super) fn evaluate(&self, wi: V3<S>, bound: bool) -> Evaluated<S> {
+        let bound = if bound { self.albedo_bound(wi) } else { [S::zero(); 3] };
+        Evaluated { f: self.f(wi), pdf: self.pdf(wi), bound }
+    }
+
     /// See [`super::Lobe::f`].
     pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>) -> Rgb<L> {
         self.lanes(wi, |wo, wi| {

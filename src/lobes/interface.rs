@@ -19,11 +19,11 @@
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
 use super::rough::{Reflectance, chance, even, largest, split};
-use super::{Rgb, Sides};
+use super::{Rgb, Sides, each_lane, over_lanes_with};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Real, V3, fresnel, sampling};
+use crate::optics::{F32x8, Lift, Real, V3, fresnel, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// The index that is used for a script's: between 1/4 and 4, and no closer to 1 than 1 %, where refraction would become
@@ -76,42 +76,59 @@ impl<S: Real> Interface<S> {
         wo: V3<S>,
         tables: &FacetTables<S>,
     ) -> Self {
-        let alpha = [S::from_f32(even(alpha)); 2];
-        let facets = Facets::new(shape, alpha);
+        let facets = Facets::new(shape, [S::from_f32(even(alpha)); 2]);
+        let sides = Sides::tinted(tints);
+        let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
+        let odds = [largest(reflected), largest(refracted)];
+        let (zero, none) = (S::zero(), [S::zero(); 2]);
+        Interface {
+            wo,
+            facets,
+            eta,
+            colored,
+            far: zero,
+            side: zero,
+            reach: zero,
+            proposal: zero,
+            reflected,
+            refracted,
+            again: none,
+            crossing: none,
+            even: zero,
+            across: zero,
+            odds,
+            sides,
+        }
+        .toward(wo, tables)
+    }
+
+    /// The same surface seen from another ωo.
+    pub(super) fn toward(self, wo: V3<S>, tables: &FacetTables<S>) -> Self {
+        let Interface { facets, eta, odds, .. } = self;
         let outside = wo.z.gt(S::zero());
         // Both are computed, because a Real cannot branch.
         let pick = |a: S, b: S| S::select(outside, a, b);
-        let side = pick(S::one(), -S::one());
-        let (up, down) = (tables.mean_missing(false, alpha), tables.mean_missing(true, alpha));
+        let (up, down) = (tables.mean_missing(false, facets.alpha()), tables.mean_missing(true, facets.alpha()));
         let (near, far) = (pick(up, down), pick(down, up));
         let inside_flux = S::c(eta * eta) * down;
         let shared = S::c(4.0 * eta / ((1.0 + eta) * (1.0 + eta))) * up.min(inside_flux);
         let tiny = S::c(1e-30);
         let (cross_up, cross_down) = (shared / up.max(tiny), shared / inside_flux.max(tiny));
         let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
-        let missing = tables.missing(wo, alpha) * S::c(FRAC_1_PI);
-        let sides = Sides::tinted(tints);
-        let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
-        let odds = [largest(reflected), largest(refracted)];
+        let missing = tables.missing(wo, facets.alpha()) * S::c(FRAC_1_PI);
         let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
         let even = S::c(1.0 / FRAC_1_PI) * missing * S::select((back + on).gt(S::zero()), S::one(), S::zero());
         Interface {
             wo,
-            facets,
-            eta,
-            colored,
             far: pick(S::c(eta), S::c(1.0 / eta)),
-            side,
+            side: pick(S::one(), -S::one()),
             reach: facets.reach(wo),
             proposal: facets.proposal().reach(wo),
-            reflected,
-            refracted,
             again: [missing * (S::one() - crossing[0]) / near.max(tiny), missing * crossing[0] / far.max(tiny)],
             crossing,
             even,
             across: on / (back + on).max(tiny),
-            odds,
-            sides,
+            ..self
         }
     }
 
@@ -225,6 +242,46 @@ impl<S: Real> Interface<S> {
 
     #[inline(always)]
     pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+        self.value(wi, tables.missing(wi, self.facets.alpha()))
+    }
+
+    /// [`f`](Self::f) for every lane, the same bits. What is chosen and what reads tables stands outside the loop.
+    #[inline(always)]
+    pub(super) fn f_lanes(&self, wi: &V3<F32x8>, tables: &FacetTables<S>) -> Rgb<F32x8>
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        let missing = tables.missing(*wi, self.facets.alpha());
+        match self.plain() {
+            Some(plain) => over_lanes_with(wi, missing, |w, missing| plain.value(w, missing)),
+            None => over_lanes_with(wi, missing, |w, missing| self.value(w, missing)),
+        }
+    }
+
+    /// [`pdf`](Self::pdf) likewise.
+    #[inline(always)]
+    pub(super) fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        match self.plain() {
+            Some(plain) => each_lane(wi, |w| plain.pdf::<f32>(w)),
+            None => each_lane(wi, |w| self.pdf::<f32>(w)),
+        }
+    }
+
+    /// Itself, in words that the compiler sees as constants, if it is the plainest: Fresnel's reflectance and GGX slopes.
+    #[inline(always)]
+    fn plain(&self) -> Option<Self> {
+        let facets = self.facets.proposal();
+        (self.colored.is_none() && self.facets.is_ggx()).then_some(Interface { colored: None, facets, ..*self })
+    }
+
+    /// f where `missing` is what the tables say at ωi.
+    #[inline(always)]
+    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, missing: L) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let (same, other) = self.sides(wi);
         let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
@@ -233,7 +290,6 @@ impl<S: Real> Interface<S> {
         let reflectance = self.reflectance(wi);
         let (h, jacobian, passed) = self.refraction(wi);
         let bent = jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
-        let missing = tables.missing(wi, self.facets.alpha());
         let [back_again, on_again] = self.again.map(|a| L::lift(a) * missing);
         std::array::from_fn(|c| {
             let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);

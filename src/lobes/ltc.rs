@@ -43,6 +43,27 @@ pub fn read<S: Real>(table: &Table, cos: S, roughness: S) -> [S; PARAMS] {
     })
 }
 
+/// The numbers of `table` at a roughness, for all nodes over the cosine.
+pub(super) fn row(table: &Table, roughness: f64) -> Vec<f64> {
+    let y = (1.0 - roughness.ln() / MIN_ROUGHNESS.ln()).clamp(0.0, 1.0) * (ROUGHNESS_NODES - 1) as f64;
+    let j = y.floor().min((ROUGHNESS_NODES - 2) as f64);
+    let at = |row: usize, k: usize| f64::from(table[row * COS_NODES * PARAMS + k]);
+    let mix = |k: usize| at(j as usize, k) + (at(j as usize + 1, k) - at(j as usize, k)) * (y - j);
+    (0..COS_NODES * PARAMS).map(mix).collect()
+}
+
+/// The four numbers of a [`row`] at a cosine, linearly.
+#[inline(always)]
+pub(super) fn read_row<S: Real>(row: &[S], cos: S) -> [S; PARAMS] {
+    let x = cos.clamp(S::zero(), S::one()).sqrt() * S::c((COS_NODES - 1) as f64);
+    let i = x.whole().min(S::c((COS_NODES - 2) as f64));
+    let start = i * S::c(PARAMS as f64);
+    std::array::from_fn(|p| {
+        let pick = |offset: usize| S::gather(row, start + S::c((offset * PARAMS + p) as f64));
+        (pick(1) - pick(0)).mul_add(x - i, pick(0))
+    })
+}
+
 /// A transformed cosine, turned toward ωo's azimuth, and the share of uniform directions mixed into it.
 #[derive(Clone, Copy, Debug)]
 pub struct Ltc<S> {
@@ -96,16 +117,14 @@ impl<S: Real> Ltc<S> {
         let below = u[0] / self.uniform.max(S::c(1e-6));
         let above = (u[0] - self.uniform) / (S::one() - self.uniform);
         let again = S::select(uniform, below, above).clamp(S::zero(), S::c(0.999_999_94));
-        let cosine = sampling::cosine_hemisphere([again, u[1]]);
+        // Both maps turn by the same angle.
+        let (cosine, flat) = sampling::cosine_and_uniform_hemisphere([again, u[1]]);
         let x = (cosine.x - self.c * cosine.z) / self.a;
         let y = cosine.y / self.b;
         let [cos, sin] = self.turn;
         let ltc = V3::new(cos * x - sin * y, sin * x + cos * y, cosine.z);
         let ltc = ltc.scale(S::one() / ltc.length_squared().sqrt());
-        let flat = sampling::uniform_hemisphere([again, u[1]]);
-        V3::new(0, 1, 2).map(|i: usize| {
-            let of = |v: V3<S>| [v.x, v.y, v.z][i];
-            S::select(uniform, of(flat), of(ltc))
-        })
+        let pick = |flat: S, ltc: S| S::select(uniform, flat, ltc);
+        V3::new(pick(flat.x, ltc.x), pick(flat.y, ltc.y), pick(flat.z, ltc.z))
     }
 }

@@ -132,6 +132,13 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// Prepares everything that depends on the parameters and on ωo alone.
     fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self;
 
+    /// The same lobe for another ωo: the bits that [`new`](Lobe::new) gives for the same parameters. `None` if there is no
+    /// shorter way.
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+        let _ = (wo, curve);
+        None
+    }
+
     /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
 
@@ -147,6 +154,16 @@ pub trait Lobe<S: Real>: Sized + Copy {
 
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L;
+
+    /// [`pdf`](Lobe::pdf) for every lane, the same bits; see [`f_lanes`](Lobe::f_lanes).
+    #[inline(always)]
+    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
+    where
+        f32: Lift<S>,
+        F32x8: Lift<S>,
+    {
+        each_lane(wi, |w| self.pdf::<f32>(w))
+    }
 
     /// A direction for two uniform numbers in [0, 1).
     fn sample(&self, u: [S; 2]) -> V3<S>;
@@ -194,6 +211,7 @@ pub trait Lobe<S: Real>: Sized + Copy {
 
 /// All that an evaluation asks of a lobe for one direction, or for several side by side.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Evaluated<L> {
     /// See [`Lobe::f`].
     pub f: Rgb<L>,
@@ -209,12 +227,42 @@ fn evaluate<S: Real>(lobe: &impl Lobe<S>, wi: V3<S>, curve: &AlbedoCurve<S>, bou
     Evaluated { f: lobe.f(wi, curve), pdf: lobe.pdf(wi), bound }
 }
 
+#[inline(always)]
+fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+    [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
+}
+
 /// Long formulas as loops over the lanes, which the compiler makes vector code of; what only reads a table as it is.
 #[inline(always)]
 fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
     let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
-    let [pdf, ..] = over_lanes(wi, |w| [lobe.pdf(w); 3]);
-    Evaluated { f: lobe.f_lanes(wi, curve), pdf, bound }
+    Evaluated { f: lobe.f_lanes(wi, curve), pdf: lobe.pdf_lanes(wi), bound }
+}
+
+/// One number of every lane.
+#[inline(always)]
+pub(crate) fn each_lane(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> f32) -> F32x8 {
+    // What the loop reads and writes is local, so that nothing it writes can be something it reads.
+    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
+    let mut out = [0.0; F32x8::LANES];
+    for i in 0..F32x8::LANES {
+        out[i] = f(V3::new(x[i], y[i], z[i]));
+    }
+    F32x8(out)
+}
+
+/// `f` of every lane and of a number that goes with it.
+#[inline(always)]
+pub(crate) fn over_lanes_with(wi: &V3<F32x8>, with: F32x8, f: impl Fn(V3<f32>, f32) -> Rgb<f32>) -> Rgb<F32x8> {
+    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
+    let (F32x8(with), mut out) = (with, [[0.0; F32x8::LANES]; 3]);
+    for i in 0..F32x8::LANES {
+        let value = f(V3::new(x[i], y[i], z[i]), with[i]);
+        for c in 0..3 {
+            out[c][i] = value[c];
+        }
+    }
+    out.map(F32x8)
 }
 
 /// `f` of every lane.
@@ -327,15 +375,40 @@ macro_rules! lobes {
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
             }
+            /// See [`Lobe::toward`]. Written in place, because there is room for the largest lobe. False, and nothing is
+            /// written, if there is no shorter way than [`new`](Self::new).
+            pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
+                match self {
+                    $( AnyLobe::$Lobe(l) => {
+                        let turned = Lobe::<S>::toward(l, wo, curve);
+                        if let Some(turned) = turned {
+                            *to = AnyLobe::$Lobe(turned);
+                        }
+                        turned.is_some()
+                    } )*
+                    AnyLobe::Host(_) => false,
+                }
+            }
+            /// What it is.
+            pub(crate) fn kind(&self) -> LobeKind {
+                match self { $( AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
+            }
             /// What evaluating a BSDF needs of a lobe, in one call.
             #[inline(always)]
             pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
                 match self {
+                    AnyLobe::Diffuse(l) => evaluate(l, wi, curve, bound),
+                    AnyLobe::Sheen(l) => evaluate(l, wi, curve, bound),
+                    AnyLobe::OrenNayar(l) => evaluate(l, wi, curve, bound),
+                    _ => self.evaluate_apart(wi, curve, bound),
+                }
+            }
+            /// Apart, so that a walk stays short whatever lobes there are.
+            #[inline(never)]
+            fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+                match self {
                     $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
-                    AnyLobe::Host(l) => {
-                        let bound = if bound { l.albedo_bound(wi) } else { [S::zero(); 3] };
-                        Evaluated { f: l.f(wi), pdf: l.pdf(wi), bound }
-                    }
+                    AnyLobe::Host(l) => l.evaluate(wi, bound),
                 }
             }
             /// See [`Lobe::f`].
@@ -384,6 +457,28 @@ macro_rules! lobes {
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
                 match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
+            }
+        }
+
+        impl<S: Real> AnyLobe<S> {
+            /// [`albedo`](Self::albedo), and [`albedo_bound`](Self::albedo_bound) if it is asked for. Here, not in a call, for
+            /// the lobes that most materials are made of: three numbers that come from a call have to be waited for.
+            #[inline(always)]
+            pub(crate) fn albedos(&self, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+                match self {
+                    AnyLobe::Diffuse(l) => albedos(l, w, curve, bound),
+                    AnyLobe::Sheen(l) => albedos(l, w, curve, bound),
+                    AnyLobe::OrenNayar(l) => albedos(l, w, curve, bound),
+                    _ => {
+                        let bound = if bound { self.albedo_bound(w, curve) } else { [S::zero(); 3] };
+                        [self.albedo(w, curve), bound]
+                    }
+                }
+            }
+
+            /// The smallest of them, black: until another takes its place.
+            pub(crate) fn nothing() -> Self {
+                AnyLobe::Diffuse(diffuse::Diffuse::black())
             }
         }
 

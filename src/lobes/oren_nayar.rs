@@ -41,6 +41,7 @@ pub struct OrenNayar<S> {
 impl<S: Real> OrenNayar<S> {
     /// The published lobe's albedo at `cos` > 0: A + B/π·[sin θ(θ − sin θ cos θ) + ⅔·tan θ(1 − sin³ θ)], written so
     /// that nothing cancels at grazing angles; next to the normal the sine has digits that the cosine has lost.
+    #[inline(always)]
     fn raw_albedo<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
         let cos = w.z.clamp(L::zero(), L::one());
         let sin = w.x.mul_add(w.x, w.y.sq()).sqrt().min(L::one());
@@ -97,6 +98,11 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         OrenNayar { excess: lobe.raw_albedo(wo).max(S::one()), ..lobe }
     }
 
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+        let excess = self.raw_albedo(wo).max(S::one());
+        Some(OrenNayar { wo, excess, scale: Self::on_side(wo.z, S::c(FRAC_1_PI)), ..*self })
+    }
+
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
@@ -108,6 +114,7 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         [Self::on_side(wi.z, f); 3]
     }
 
+    #[inline(always)]
     fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
@@ -116,10 +123,12 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         sampling::cosine_hemisphere(u)
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
         [Self::on_side(w.z, self.raw_albedo(w).min(S::one())); 3]
     }
 
+    #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
         [Self::on_side(w.z, self.raw_albedo(w).min(L::one())); 3]
     }

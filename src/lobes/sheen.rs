@@ -29,7 +29,7 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb, over_lanes};
+use super::{Lobe, LobeKind, Rgb, each_lane};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::{F32x8, Lift, Real, V3};
 
@@ -158,6 +158,15 @@ impl Variant {
         }
     }
 
+    /// What it is sampled by; under `zeltner` also what it is.
+    fn table(self) -> &'static ltc::Table {
+        match self {
+            Softened | RefitSoftened => &SOFTENED,
+            Fitted | Refit | Exact | CharlieV => &SHEEN,
+            Zeltner => &ZELTNER,
+        }
+    }
+
     fn reciprocal(self) -> bool {
         matches!(self, Fitted | Refit | Exact | CharlieV)
     }
@@ -215,37 +224,66 @@ pub struct Sheen<S> {
 }
 
 impl<S: Real> Sheen<S> {
-    fn prepare(variant: Variant, roughness: S, wo: V3<S>, terms: &[S]) -> Self {
+    /// `known`: what [`extra`](Self::extra) gave.
+    fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: &[S]) -> Self {
         let r = roughness.clamp(S::c(variant.floor()), S::one());
-        let mut ltc =
-            Ltc::proposal(if variant == Softened || variant == RefitSoftened { &SOFTENED } else { &SHEEN }, wo, r);
         let fitted = |fit: FittedLambda<S>, soften: f64| {
-            let cos = wo.z.clamp(S::c(MIN_COS), S::one());
-            let lambda_o = S::one() + fit.ln_lambda(cos).exp();
-            Shadowing::Fitted(FittedFor { fit, lambda_o, scale: S::c(0.25) / cos, soften: S::c(soften) })
+            let (lambda_o, scale) = (S::one(), S::one());
+            Shadowing::Fitted(FittedFor { fit, lambda_o, scale, soften: S::c(soften) })
         };
         let shadowing = match variant {
             Softened => fitted(FittedLambda::published(r), 2.0),
             Fitted => fitted(FittedLambda::published(r), 0.0),
             RefitSoftened => fitted(FittedLambda::refitted(r), 2.0),
             Refit => fitted(FittedLambda::refitted(r), 0.0),
-            Exact => {
-                let exact = ExactLambda::new(r);
-                Shadowing::Exact { exact, cos_lambda_o: exact.cos_lambda(unit_cosine(wo), sin2(wo), terms) }
-            }
+            Exact => Shadowing::Exact { exact: ExactLambda::new(r), cos_lambda_o: S::zero() },
             CharlieV => Shadowing::Visibility,
-            Zeltner => {
-                let [a, b, c, albedo] = ltc::read(&ZELTNER, wo.z, r);
-                ltc = Ltc::new([a, b, c, S::zero()], wo);
-                Shadowing::Transformed { albedo }
+            Zeltner => Shadowing::Transformed { albedo: S::zero() },
+        };
+        let params = match split(known).1 {
+            [] => ltc::read(variant.table(), wo.z, r),
+            row => ltc::read_row(row, wo.z),
+        };
+        let ltc = Ltc::new([S::one(), S::one(), S::zero(), S::one()], wo);
+        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }.aimed(wo, params, known)
+    }
+
+    /// Turned toward ωo, where its transformed cosine has the parameters `params`.
+    #[inline(always)]
+    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: &[S]) -> Self {
+        let [a, b, c, share] = params;
+        let mut uniform = share;
+        let shadowing = match self.shadowing {
+            Shadowing::Fitted(fitted) => {
+                let cos = wo.z.clamp(S::c(MIN_COS), S::one());
+                let lambda_o = S::one() + fitted.fit.ln_lambda(cos).exp();
+                Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / cos, ..fitted })
+            }
+            Shadowing::Exact { exact, .. } => {
+                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), split(known).0);
+                Shadowing::Exact { exact, cos_lambda_o }
+            }
+            Shadowing::Visibility => Shadowing::Visibility,
+            Shadowing::Transformed { .. } => {
+                uniform = S::zero();
+                Shadowing::Transformed { albedo: share }
             }
         };
-        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }
+        Sheen { wo, shadowing, ltc: Ltc::new([a, b, c, uniform], wo), ..self }
     }
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
     fn value<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
+        match self.shadowing {
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
+            _ => self.value_apart(wi, terms),
+        }
+    }
+
+    /// Apart, so that the default model stays short.
+    #[inline(never)]
+    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
         match self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
             Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, terms),
@@ -320,17 +358,31 @@ impl<S: Real> Sheen<S> {
         }
     }
 
-    /// For [`CurveSpec::extra`]: the coefficients of the exact Λ, where it may be asked for.
+    /// For [`CurveSpec::extra`]: the coefficients of the exact Λ, where it may be asked for; then, of a lobe that is all
+    /// known, its row of the transformed cosines.
     fn extra(key: &[f64; 4], axis: Option<Axis>) -> Vec<f64> {
-        if key[1] as u32 & 1 << Exact as u32 == 0 {
-            vec![]
-        } else if axis.is_some() {
-            charlie::term_rows()
-        } else {
-            charlie::terms_at(key[0]).to_vec()
+        let mask = key[1] as u32;
+        let mut known = match axis {
+            _ if mask & 1 << Exact as u32 == 0 => vec![],
+            Some(_) => charlie::term_rows(),
+            None => charlie::terms_at(key[0]).to_vec(),
+        };
+        if axis.is_none() && mask.is_power_of_two() {
+            known.extend(ltc::row(Variant::ALL[mask.trailing_zeros() as usize].table(), key[0]));
         }
+        known
     }
 }
+
+/// The coefficients and the row that [`Sheen::extra`] gave; either may be empty.
+#[inline(always)]
+fn split<S>(known: &[S]) -> (&[S], &[S]) {
+    let row = matches!(known.len(), ROW | ROW_AFTER_TERMS);
+    known.split_at(if row { known.len() - ROW } else { known.len() })
+}
+
+const ROW: usize = ltc::COS_NODES * ltc::PARAMS;
+const ROW_AFTER_TERMS: usize = charlie::COS_TERMS + ROW;
 
 /// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
 #[inline(always)]
@@ -400,8 +452,17 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     #[inline(always)]
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+        let (known, excess) = (curve.extra(), curve.excess(wo, self.roughness));
+        match split(known).1 {
+            [] => None,
+            row => Some(Sheen { excess, ..self.aimed(wo, ltc::read_row(row, wo.z), known) }),
+        }
+    }
+
+    #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.kept(wi, curve, self.value(wi, curve.extra()))
+        self.kept(wi, curve, self.value(wi, split(curve.extra()).0))
     }
 
     #[inline(always)]
@@ -410,13 +471,14 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         f32: Lift<S>,
         F32x8: Lift<S>,
     {
-        let [value, ..] = match self.shadowing {
-            Shadowing::Fitted(fitted) => over_lanes(wi, |w| [self.fitted(fitted, w); 3]),
+        let value = match self.shadowing {
+            Shadowing::Fitted(fitted) => each_lane(wi, |w| self.fitted(fitted, w)),
             Shadowing::Exact { exact, cos_lambda_o } => {
-                over_lanes(wi, |w| [self.exact(exact, cos_lambda_o, w, curve.extra()); 3])
+                let terms = split(curve.extra()).0;
+                each_lane(wi, |w| self.exact(exact, cos_lambda_o, w, terms))
             }
-            Shadowing::Visibility => over_lanes(wi, |w| [self.visible(w); 3]),
-            Shadowing::Transformed { albedo } => over_lanes(wi, |w| [self.transformed(albedo, w); 3]),
+            Shadowing::Visibility => each_lane(wi, |w| self.visible(w)),
+            Shadowing::Transformed { albedo } => each_lane(wi, |w| self.transformed(albedo, w)),
         };
         self.kept(*wi, curve, value)
     }
@@ -430,6 +492,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         self.ltc.sample(u)
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
     }

@@ -114,6 +114,13 @@ pub fn floor(x: f32) -> f32 {
     if x.abs() < WHOLE { below } else { x }
 }
 
+/// [`floor`] of a number in [0, 2²²], for less.
+#[inline(always)]
+pub(crate) fn whole(x: f32) -> f32 {
+    let near = (x + WHOLE) - WHOLE;
+    near - if near > x { 1.0 } else { 0.0 }
+}
+
 /// A whole number in [0, 2²³) as an index. Anything else: some number below 2²³.
 #[inline(always)]
 pub fn index(x: f32) -> usize {

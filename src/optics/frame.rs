@@ -38,6 +38,7 @@ impl<S: Scalar> Frame<S> {
 }
 
 /// The unit vector along `v`; `None` if `v` is zero or not finite. Safe for lengths whose square over- or underflows.
+#[inline(always)]
 pub fn normalize<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
     let square = v.length_squared();
     if is_ordinary(square) { Some(v.scale(S::one() / square.sqrt())) } else { normalize_extreme(v) }
@@ -61,6 +62,7 @@ fn normalize_extreme<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
 }
 
 /// The part of `along` perpendicular to the unit vector `n`, normalised; `None` if less than 1e-6 of it is left.
+#[inline(always)]
 fn tangent<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
     let t = along - n.scale(n.dot(along));
     let (square, whole) = (t.length_squared(), along.length_squared());
@@ -68,6 +70,12 @@ fn tangent<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
     if is_ordinary(whole) && square.gt(whole * S::c(0.25)) {
         return Some(t.scale(S::one() / square.sqrt()));
     }
+    tangent_near(n, along)
+}
+
+/// [`tangent`] where `along` is nearly parallel to the normal, or its square not a number to rely on.
+#[cold]
+fn tangent_near<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
     let a = normalize(along)?;
     let t = a - n.scale(n.dot(a));
     if t.length_squared().lt(S::c(1e-12)) {

@@ -56,6 +56,7 @@ impl Real for f64 {
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
+    #[inline(always)]
     fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
         f(values)
     }
@@ -91,8 +92,15 @@ impl Real for f32 {
         // Not `f32::mul_add`: without the instruction it is a slow library call, and the lanes must agree bit for bit.
         self * a + b
     }
+    #[inline(always)]
     fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3] {
-        f(values.map(f64::from)).map(|x| x as f32)
+        // Not `map`, which is a call.
+        let mut wide = [0.0; N];
+        for (wide, x) in wide.iter_mut().zip(values) {
+            *wide = f64::from(x);
+        }
+        let [x, y, z] = f(wide);
+        [x as f32, y as f32, z as f32]
     }
     #[inline(always)]
     fn turned(self, a: f64, o: Self, b: f64) -> Self {
@@ -101,6 +109,10 @@ impl Real for f32 {
     #[inline(always)]
     fn floor(self) -> Self {
         elementary::floor(self)
+    }
+    #[inline(always)]
+    fn whole(self) -> Self {
+        elementary::whole(self)
     }
     #[inline(always)]
     fn pick(table: &[f32], index: Self) -> Self {
@@ -273,6 +285,10 @@ impl Real for F32x8 {
         self.map(elementary::floor)
     }
     #[inline(always)]
+    fn whole(self) -> Self {
+        self.map(elementary::whole)
+    }
+    #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
@@ -339,6 +355,27 @@ impl Lift<f32> for F32x8 {
     #[inline(always)]
     fn gather(table: &[f32], index: Self) -> Self {
         index.map(|i| <f32 as Lift<f32>>::gather(table, i))
+    }
+    /// In three loops: the one in the middle, which reads, cannot become vector code, and would keep the rest from it.
+    #[inline(always)]
+    fn quartic(table: &[f32], cells: f32, x: Self) -> Self {
+        let (mut first, mut part) = ([0; 8], [0.0; 8]);
+        for k in 0..8 {
+            let place = Real::clamp(x.0[k], 0.0, 1.0).sqrt().sqrt() * cells;
+            let i = Real::min(Real::whole(place), cells - 1.0);
+            (first[k], part[k]) = (elementary::index(i) as u32, place - i);
+        }
+        let (mut a, mut b) = ([0.0; 8], [0.0; 8]);
+        for k in 0..8 {
+            if let Some([low, high]) = table.get(first[k] as usize..).and_then(|rest| rest.first_chunk()) {
+                (a[k], b[k]) = (*low, *high);
+            }
+        }
+        let mut out = [0.0; 8];
+        for k in 0..8 {
+            out[k] = if x.0[k] > 0.0 { (b[k] - a[k]) * part[k] + a[k] } else { 0.0 };
+        }
+        F32x8(out)
     }
 }
 

@@ -39,8 +39,15 @@ impl<S: Real> Facets<S> {
     }
 
     /// The same widths with GGX slopes: what visible facets are drawn from.
+    #[inline(always)]
     pub fn proposal(&self) -> Self {
         Facets { shape: Shape::Ggx, ..*self }
+    }
+
+    /// Whether the slopes are GGX's.
+    #[inline(always)]
+    pub(crate) fn is_ggx(&self) -> bool {
+        matches!(self.shape, Shape::Ggx)
     }
 
     /// The widths along x and y.

@@ -45,6 +45,10 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// The next whole number below.
     fn floor(self) -> Self;
+    /// [`floor`](Self::floor) of a number in [0, 2²²], for less: the cell of a table.
+    fn whole(self) -> Self {
+        self.floor()
+    }
     /// `self·a + b`, fused where the machine fuses.
     fn mul_add(self, a: Self, b: Self) -> Self;
     /// `self·a + o·b` with double-precision constants, rounded once: keeps its digits where the two products cancel.
@@ -128,4 +132,17 @@ pub trait Lift<S>: Sized {
     fn lift(s: S) -> Self;
     /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
     fn gather(table: &[S], index: Self) -> Self;
+
+    /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
+    #[inline(always)]
+    fn quartic(table: &[S], cells: S, x: Self) -> Self
+    where
+        Self: Real + Lift<S>,
+    {
+        let cells = Self::lift(cells);
+        let place = x.clamp(Self::zero(), Self::one()).sqrt().sqrt() * cells;
+        let i = place.whole().min(cells - Self::one());
+        let (a, b) = (Self::gather(table, i), Self::gather(table, i + Self::one()));
+        Self::select(x.gt(Self::zero()), (b - a).mul_add(place - i, a), Self::zero())
+    }
 }

@@ -11,6 +11,7 @@ pub fn cosine_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
 }
 
 /// Density of [`cosine_hemisphere`]; 0 below the surface.
+#[inline(always)]
 pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
     cos.max(R::zero()) * R::c(FRAC_1_PI)
 }
@@ -18,6 +19,13 @@ pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
 /// A direction about z, uniform over the upper hemisphere.
 pub fn uniform_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
     V3::polar(u[0], u[1] * R::c(TAU))
+}
+
+/// [`cosine_hemisphere`] and [`uniform_hemisphere`] of the same numbers.
+pub(crate) fn cosine_and_uniform_hemisphere<R: Real>(u: [R; 2]) -> (V3<R>, V3<R>) {
+    let (s, c) = (u[1] * R::c(TAU)).sin_cos();
+    let (root, sin) = (u[0].sqrt(), (R::one() - u[0] * u[0]).safe_sqrt());
+    (V3::new(root * c, root * s, (R::one() - u[0]).safe_sqrt()), V3::new(sin * c, sin * s, u[0]))
 }
 
 /// Density of [`uniform_hemisphere`]; 0 below the surface.

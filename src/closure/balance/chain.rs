@@ -1,6 +1,6 @@
 //! The layers above a lobe, as far as balancing asks.
 
-use super::super::walk::LobeVisit;
+use super::super::walk::{LobeVisit, first};
 use super::Unbalanced;
 use crate::lobes::Rgb;
 use crate::optics::{Scalar, V3};
@@ -71,7 +71,7 @@ impl<S: Scalar> Chain<S> {
                 open.normal = Some(normal);
             }
             open.more |= open.single.is_some();
-            open.single = Some(Single { site: visit.site, weight: visit.weights.in_top, param });
+            open.single = Some(Single { site: visit.site, weight: first(visit.weights.in_top), param });
         }
     }
 

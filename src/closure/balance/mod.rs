@@ -27,7 +27,7 @@ pub use solve::Kernel;
 use super::flatten::Curves;
 use super::layer::{LayerStack, LayeringRule, TintRule};
 use super::tree::{ClosureTree, MAX_LAYERS};
-use super::walk::{self, LobeVisit, Visitor, Weights, walk};
+use super::walk::{self, LobeVisit, Visitor, Weights, first, walk};
 use crate::albedo::Precision;
 use crate::globals::Globals;
 use crate::lobes::registry::{LobeClass, ParamTy};
@@ -443,6 +443,7 @@ impl<S: Scalar> Visitor<S> for Planner<'_, S> {
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
+        let visit = visit.tinted();
         let LobeVisit { kind, site, values, .. } = visit;
         if kind.class() == LobeClass::Emission {
             self.lobes.push((kind, None));
@@ -473,7 +474,7 @@ impl<S: Scalar> Visitor<S> for Passed<'_, S> {
     }
 
     fn middle(&mut self, w: Weights<S>) {
-        self.stack.middle(w.in_top, LayeringRule::Balanced, self.tint, None::<Rgb<S>>);
+        self.stack.middle(first(w.in_top), LayeringRule::Balanced, self.tint, None::<Rgb<S>>);
     }
 
     fn end(&mut self) {
@@ -481,12 +482,12 @@ impl<S: Scalar> Visitor<S> for Passed<'_, S> {
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
-        let LobeVisit { kind, site, values, weights } = visit;
+        let LobeVisit { kind, site, values, weights } = visit.tinted();
         self.passed.push(self.stack.scale().map(S::to_f64));
         if kind.class() != LobeClass::Emission {
             let curve = self.curves.of(site);
             let bound = AnyLobe::<S>::new(kind, values, self.wo, curve).albedo_bound(self.wo, curve);
-            self.stack.lobe(weights.in_top, bound);
+            self.stack.lobe(first(weights.in_top), bound);
         }
     }
 }

@@ -1,0 +1,130 @@
+//! What is known of a lobe before any point is shaded, made once per place in the program that constructs one.
+//!
+//! Where a parameter block turns out to be the one that was prepared for, a lobe is turned toward ωo in place of being
+//! made from its parameters. The block is compared each time: nothing here need be told when a tree changes.
+
+use super::walk::Weights;
+use crate::albedo::AlbedoCurve;
+use crate::lobes::registry::ParamTy;
+use crate::lobes::{AnyLobe, LobeKind, Rgb32};
+use crate::optics::{Scalar, V3};
+
+/// A lobe whose parameters, but for directions, are known.
+#[derive(Clone, Debug)]
+pub(super) struct Site<S: Scalar> {
+    kind: LobeKind,
+    /// Its block, and which bits of each slot count: none of a direction's, which shading may change.
+    block: Vec<(u32, u32)>,
+    /// Its color.
+    weight: Rgb32,
+    white: bool,
+    /// Prepared for a viewer along the normal.
+    lobe: AnyLobe<S>,
+}
+
+impl<S: Scalar> Site<S> {
+    /// `None` if something but a direction is known only when shading.
+    pub fn new(kind: LobeKind, known: &[Option<f32>], curve: &AlbedoCurve<S>) -> Option<Self> {
+        let types = kind.spec().params.iter().flat_map(|p| std::iter::repeat_n(p.ty, p.ty.slots()));
+        let counts = types.map(|ty| !matches!(ty, ParamTy::Normal | ParamTy::Vector));
+        let slots = known.iter().zip(counts).map(|(value, counts)| match (value, counts) {
+            (Some(value), true) => Some((value.to_bits(), u32::MAX)),
+            (None, true) => None,
+            (_, false) => Some((0, 0)),
+        });
+        let block = slots.collect::<Option<Vec<_>>>()?;
+        let values: Vec<f32> = block.iter().map(|(bits, _)| f32::from_bits(*bits)).collect();
+        let above = V3::new(S::zero(), S::zero(), S::one());
+        let lobe = AnyLobe::new(kind, &values, above, curve);
+        let weight = kind.weight(&values);
+        Some(Site { kind, block, weight, white: weight == [1.0; 3], lobe })
+    }
+
+    /// The same with another table's numbers.
+    pub fn cast<T: Scalar>(&self, curve: &AlbedoCurve<T>) -> Option<Site<T>> {
+        let known: Vec<_> = self.block.iter().map(|(bits, _)| Some(f32::from_bits(*bits))).collect();
+        Site::new(self.kind, &known, curve)
+    }
+
+    /// Whether it was prepared for this block.
+    #[inline(always)]
+    pub fn is_of(&self, kind: LobeKind, values: &[f32]) -> bool {
+        let differs = |(value, (bits, counts)): (&f32, &(u32, u32))| (value.to_bits() ^ bits) & counts;
+        self.kind == kind && values.iter().zip(&self.block).map(differs).fold(0, |all, d| all | d) == 0
+    }
+
+    /// `weights` with the lobe's color, [`LobeKind::weight`], among them.
+    #[inline(always)]
+    pub fn tinted(&self, weights: Weights<S>) -> Weights<S> {
+        if self.white { weights } else { weights.times(self.weight) }
+    }
+
+    /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters.
+    #[inline(always)]
+    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
+        self.lobe.turn(wo, curve, to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::albedo::Precision;
+
+    /// Blocks of every lobe: its defaults, and for sheens every model.
+    fn blocks() -> impl Iterator<Item = (LobeKind, Vec<f32>)> {
+        let defaults = |kind: LobeKind| {
+            let params = kind.spec().params.iter();
+            let values = params.flat_map(|p| (0..p.ty.slots()).map(|k| p.default.get(k).copied().unwrap_or(0.0)));
+            values.collect::<Vec<_>>()
+        };
+        LobeKind::ALL.iter().flat_map(move |kind| {
+            let models = if *kind == LobeKind::Sheen { 0..6 } else { 0..1 };
+            models.map(move |model| {
+                let mut values = defaults(*kind);
+                if *kind == LobeKind::Sheen {
+                    values[8] = model as f32;
+                }
+                (*kind, values)
+            })
+        })
+    }
+
+    #[test]
+    fn a_lobe_turned_is_the_lobe_made_from_its_parameters() {
+        let coarse = Precision { cos_nodes: 8, axis_nodes: 8, polar: 8, azimuth: 8, ..Precision::FAST };
+        let mut turned = 0;
+        for (kind, values) in blocks() {
+            let known: Vec<_> = values.iter().copied().map(Some).collect();
+            let curve = kind.table(&known).map_or_else(AlbedoCurve::<f32>::default, |spec| spec.bake(coarse));
+            let site = Site::new(kind, &known, &curve).expect("all is known");
+            assert!(site.is_of(kind, &values), "{kind:?}");
+            for cos in [0.9f32, 0.3, 1e-3, -0.2] {
+                let wo = V3::polar(cos, 0.7);
+                let mut lobe = AnyLobe::nothing();
+                if !site.turn(wo, &curve, &mut lobe) {
+                    continue;
+                }
+                turned += 1;
+                let made = AnyLobe::new(kind, &values, wo, &curve);
+                for wi in [V3::polar(0.8, 2.0), V3::polar(0.05, -1.0), V3::polar(-0.4, 0.3)] {
+                    let [a, b] = [&lobe, &made].map(|l| l.evaluate(wi, &curve, true));
+                    assert_eq!((a.f, a.pdf, a.bound), (b.f, b.pdf, b.bound), "{kind:?} {values:?} {cos} {wi:?}");
+                }
+                assert_eq!(lobe.sample([0.3, 0.6]), made.sample([0.3, 0.6]), "{kind:?} {values:?} {cos}");
+            }
+        }
+        assert!(turned > 4 * 8, "{turned}");
+    }
+
+    #[test]
+    fn another_block_is_told_apart_and_another_direction_is_not() {
+        let kind = LobeKind::OrenNayar;
+        let site = Site::<f32>::new(kind, &[None, None, None, Some(0.4)], &AlbedoCurve::default());
+        let site = site.expect("directions need not be known");
+        assert!(site.is_of(kind, &[0.0, 0.6, 0.8, 0.4]));
+        assert!(!site.is_of(kind, &[0.0, 0.6, 0.8, 0.3]));
+        assert!(!site.is_of(LobeKind::Sheen, &[0.0, 0.6, 0.8, 0.4]));
+        assert!(Site::<f32>::new(kind, &[Some(0.0), None, None, None], &AlbedoCurve::default()).is_none());
+    }
+}
