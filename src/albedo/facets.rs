@@ -249,7 +249,7 @@ impl FacetSpec {
         let (kind, rows, nodes) = match self.alpha {
             None => (Rows::Alpha, steps(precision.axis_nodes.min(48)), coarse),
             Some([x, y]) if x != y => {
-                let rows = steps((precision.axis_nodes / 2).clamp(8, 32));
+                let rows = steps((precision.axis_nodes / 2).clamp(16, 32));
                 (Rows::Azimuth([S::c(x.sqrt()), S::c(y.sqrt())]), rows, coarse * 3 / 2)
             }
             Some(_) => (Rows::One, 0, precision.cos_nodes * 3 / 2),

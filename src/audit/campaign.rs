@@ -6,7 +6,7 @@
 //!
 //! Most trees are far from one, and a quick estimate says so. Where it may reach one at four standard deviations it is
 //! repeated with four times the samples; where that may too, adaptive quadrature decides. Quadrature and sampling
-//! must agree: each may miss a narrow peak, but hardly the same one.
+//! must agree, or both stay below the limit: each may miss a narrow peak, but hardly the same one.
 
 use super::cubature::Tolerance;
 use super::estimate::{Estimate, direction_of, estimate, held_direction};
@@ -293,7 +293,10 @@ impl Case {
         // As exact as was asked for, and the limit lies within the error: no gain as far as can be told. A difference
         // below the limit's own slack decides nothing.
         let known = error <= tolerance.error || largest + error <= LIMIT || largest - error > LIMIT;
-        self.verdict = match known && rough.agrees(value, error + (LIMIT - 1.0), 1.5 * DEVIATIONS) {
+        let agrees = rough.agrees(value, error + (LIMIT - 1.0), 1.5 * DEVIATIONS);
+        // Where they differ one of them is wrong; if nothing is gained by either, nothing is.
+        let neither = largest + error <= LIMIT && rough.at_most(1.5 * DEVIATIONS) <= LIMIT;
+        self.verdict = match known && (agrees || neither) {
             true if largest - error > LIMIT => Verdict::Gains,
             true => Verdict::Holds,
             false => Verdict::Unresolved,

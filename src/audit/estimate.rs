@@ -23,7 +23,12 @@ pub struct Estimate {
 impl Estimate {
     /// Whether the albedo may be one, at `k` standard deviations.
     pub fn may_reach_one(&self, k: f64) -> bool {
-        (0..3).any(|c| self.value[c] + k * self.sigma[c] >= 1.0)
+        self.at_most(k) >= 1.0
+    }
+
+    /// The largest channel, `k` standard deviations up.
+    pub fn at_most(&self, k: f64) -> f64 {
+        (0..3).map(|c| self.value[c] + k * self.sigma[c]).fold(0.0, f64::max)
     }
 
     /// Whether this and another measurement with its error can be of the same albedo, at `k` standard deviations.
