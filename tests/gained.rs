@@ -25,6 +25,14 @@ const GAINED: &[(Tier, LayeringRule, f64, f64, &str)] = &[
     ),
     // By 6e-4: glass bends most within 20 degrees of the normal, between two nodes of a small table.
     (Fast, Min, 0.955, 0.0, r#"dielectric_bsdf(N, vector(1, 0, 0), 1, 1, 0.66, 0.66, 1.227, "ggx")"#),
+    // By 2e-4: what a stretched surface misses is next to nothing at the normal and grows fast from there.
+    (
+        Fast,
+        Min,
+        0.96,
+        85.0,
+        r#"dielectric_bsdf(N, vector(1, 0, 0), 1, 1, 0.0138, 0.3, 4, "beckmann", "thin_walled", 1)"#,
+    ),
     // By 9e-3: a stretched thin wall next to its total reflection.
     (
         Standard,

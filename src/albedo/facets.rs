@@ -250,7 +250,7 @@ impl FacetSpec {
             None => (Rows::Alpha, steps(precision.axis_nodes.min(48)), coarse),
             Some([x, y]) if x != y => {
                 let rows = steps((precision.axis_nodes / 2).clamp(16, 32));
-                (Rows::Azimuth([S::c(x.sqrt()), S::c(y.sqrt())]), rows, coarse * 3 / 2)
+                (Rows::Azimuth([S::c(x.sqrt()), S::c(y.sqrt())]), rows, (coarse * 3 / 2).max(64))
             }
             Some(_) => (Rows::One, 0, precision.cos_nodes * 3 / 2),
         };
@@ -288,6 +288,10 @@ impl FacetSpec {
                 let bound = &mut tables.bound[part * sheets * plane + k];
                 *bound = S::c(bound.to_f64() + margin(part + 1));
             }
+        }
+        let factors = grid.dimmed(&tables, &fine);
+        for (missing, factor) in tables.missing.iter_mut().zip(factors) {
+            *missing *= S::c(factor);
         }
         tables.means = grid.means(&tables);
         tables
@@ -343,17 +347,48 @@ impl Grid<'_> {
         Fine { values, nodes }
     }
 
-    /// By how much the truth between the nodes exceeds what is read there: a quarter more than the middles of cells and
-    /// of their edges show. E is smooth, and off most in the middle.
-    fn shortfalls<S: Scalar>(&self, tables: &FacetTables<S>, fine: &[Fine]) -> Vec<[f64; PARTS + 1]> {
-        let mut probes: Vec<(usize, usize, usize)> = Vec::new();
-        for sheet in 0..tables.sheets {
+    /// The middles of cells and of their edges, in half steps.
+    fn probes(&self, sheets: usize) -> Vec<(usize, usize, usize)> {
+        let mut probes = Vec::new();
+        for sheet in 0..sheets {
             for row in 0..2 * self.rows - 1 {
                 // Where the row is one of the table's, only what lies between the nodes.
                 let nodes = (0..2 * self.nodes - 1).filter(|node| row % 2 == 1 || node % 2 == 1);
                 probes.extend(nodes.map(|node| (sheet, row, node)));
             }
         }
+        probes
+    }
+
+    /// The nodes of the table around a probe.
+    fn around(&self, (sheet, row, node): (usize, usize, usize)) -> impl Iterator<Item = usize> + use<> {
+        let (rows, nodes) = (self.rows, self.nodes);
+        [row / 2, row.div_ceil(2)]
+            .into_iter()
+            .flat_map(move |r| [node / 2, node.div_ceil(2)].map(|n| (sheet * rows + r) * nodes + n))
+    }
+
+    /// What M at the nodes is to be multiplied by, so that no probe reads more than is missing there. Where next to nothing
+    /// is missing at one node, lowering that one does not do.
+    fn dimmed<S: Scalar>(&self, tables: &FacetTables<S>, fine: &[Fine]) -> Vec<f64> {
+        let mut factors = vec![1.0f64; tables.sheets * self.rows * self.nodes];
+        for probe in self.probes(tables.sheets) {
+            let (sheet, row, node) = probe;
+            let (w, alpha) = self.at(sheet, 0.5 * row as f64, 0.5 * node as f64);
+            let read = tables.missing(w.map(S::c), alpha.map(S::c)).to_f64();
+            let (albedo, off) = fine[sheet].at(row, node)[0];
+            let missing = (1.0 - albedo - off).max(0.0);
+            if read > missing {
+                self.around(probe).for_each(|k| factors[k] = factors[k].min(missing / read));
+            }
+        }
+        factors
+    }
+
+    /// By how much the truth between the nodes exceeds what is read there: a quarter more than the middles of cells and
+    /// of their edges show. E is smooth, and off most in the middle.
+    fn shortfalls<S: Scalar>(&self, tables: &FacetTables<S>, fine: &[Fine]) -> Vec<[f64; PARTS + 1]> {
+        let probes = self.probes(tables.sheets);
         let missed = probes.iter().map(|&(sheet, row, node)| {
             let truth = fine[sheet].at(row, node);
             let (w, alpha) = self.at(sheet, 0.5 * row as f64, 0.5 * node as f64);
@@ -366,12 +401,9 @@ impl Grid<'_> {
             missed
         });
         let mut lifts = vec![[0.0f64; PARTS + 1]; tables.sheets * self.rows * self.nodes];
-        for (&(sheet, row, node), missed) in probes.iter().zip(missed) {
-            for r in [row / 2, row.div_ceil(2)] {
-                for n in [node / 2, node.div_ceil(2)] {
-                    let lift = &mut lifts[(sheet * self.rows + r) * self.nodes + n];
-                    *lift = std::array::from_fn(|c| lift[c].max(1.25 * missed[c]));
-                }
+        for (probe, missed) in probes.iter().zip(missed) {
+            for k in self.around(*probe) {
+                lifts[k] = std::array::from_fn(|c| lifts[k][c].max(1.25 * missed[c]));
             }
         }
         lifts

@@ -181,12 +181,16 @@ impl<S: Real> Pane<S> {
     #[inline(always)]
     pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
         let w = V3::new(w.x, w.y, w.z.abs());
-        if tables.has_parts() {
-            let bound = tables.bound(w);
-            return self.total(w, tables.missing(w, self.facets.alpha()), [bound[0], bound[1]]);
-        }
         let most = |c: usize| L::lift(self.tints[0][c].max(self.tints[1][c]));
-        std::array::from_fn(|c| L::select(w.z.gt(L::zero()), most(c), L::zero()))
+        let most: Rgb<L> = std::array::from_fn(|c| L::select(w.z.gt(L::zero()), most(c), L::zero()));
+        if !tables.has_parts() {
+            return most;
+        }
+        let bound = tables.bound(w);
+        let parts = self.total(w, tables.missing(w, self.facets.alpha()), [bound[0], bound[1]]);
+        // Where it begins to reflect totally, what it reflects jumps between two nodes: all may be of the brighter part.
+        let jumps = L::lift(self.m).lt(L::zero());
+        std::array::from_fn(|c| L::select(jumps, most[c], parts[c]))
     }
 
     #[inline(always)]
