@@ -225,6 +225,10 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             return Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local);
         }
         let local = l.lobe.sample([u[0], u[1]]);
+        if local.z == S::zero() {
+            // No direction at all; turned to the world, rounding would put it on either side.
+            return None;
+        }
         let wi = frame.to_world(local);
         let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
         let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };

@@ -165,7 +165,7 @@ pub trait Lobe<S: Real>: Sized + Copy {
         each_lane(wi, |w| self.pdf::<f32>(w))
     }
 
-    /// A direction for two uniform numbers in [0, 1).
+    /// A direction for two uniform numbers in [0, 1); one in the horizon, z = 0, says that there is none for these.
     fn sample(&self, u: [S; 2]) -> V3<S>;
 
     /// Best estimate of E_view(ω) = ∫ f(ω, ωi)·|cos θi| dωi.
