@@ -6,6 +6,7 @@
 
 mod error;
 mod owned;
+mod parts;
 mod values;
 
 pub use crate::closure::Scratch;
@@ -444,7 +445,7 @@ impl Material {
         if shaded.is_err() {
             tree.clear();
         }
-        let Baked { curves, balance } = &self.inner.tables;
+        let Baked { curves, balance, .. } = &self.inner.tables;
         let tables = Tables { curves, balance: balance.as_ref() };
         flatten_into(tree, &globals, V3::from_f32(wo.to_array()), self.engine().layering, tables, bsdf)?;
         shaded.map(|()| &*bsdf)
@@ -475,30 +476,6 @@ impl Material {
     /// If the closure tree goes beyond a budget.
     pub fn shade_reference(&self, globals: &Globals, wo: [f64; 3]) -> Result<Bsdf<'_, f64>, ShadeError> {
         self.flattened(globals, V3::new(wo[0], wo[1], wo[2]), self.reference_tables())
-    }
-
-    /// The BSDF of a tree made of this material's lobes, for example of a part of [`tree`](Self::tree), seen from `wo`.
-    /// The `balanced` rule is solved for whole materials; here it is `min`.
-    ///
-    /// # Errors
-    /// If the tree goes beyond a budget.
-    pub fn flatten(&self, tree: &ClosureTree, globals: &Globals, wo: Vec3) -> Result<Bsdf<'_>, ShadeError> {
-        let wo = V3::from_f32(wo.to_array());
-        Ok(flatten(tree, globals, wo, self.engine().layering, &self.inner.tables.curves)?)
-    }
-
-    /// [`flatten`](Self::flatten) in double precision.
-    ///
-    /// # Errors
-    /// If the tree goes beyond a budget.
-    pub fn flatten_reference(
-        &self,
-        tree: &ClosureTree,
-        globals: &Globals,
-        wo: [f64; 3],
-    ) -> Result<Bsdf<'_, f64>, ShadeError> {
-        let wo = V3::new(wo[0], wo[1], wo[2]);
-        Ok(flatten(tree, globals, wo, self.engine().layering, &self.reference_tables().curves)?)
     }
 
     fn flattened<'m, S: Scalar>(
@@ -548,6 +525,7 @@ impl Material {
 struct Baked<S: Scalar> {
     curves: Curves<S>,
     balance: Option<Balance<S>>,
+    precision: Precision,
 }
 
 impl<S: Scalar> Baked<S> {
@@ -558,7 +536,7 @@ impl<S: Scalar> Baked<S> {
         }
         let balanced = layering.rule == LayeringRule::Balanced;
         let balance = balanced.then(|| balance(program, layering.tint, &curves, precision));
-        Baked { curves, balance }
+        Baked { curves, balance, precision }
     }
 
     fn bytes(&self) -> usize {

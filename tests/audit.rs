@@ -228,12 +228,15 @@ fn light_is_accounted_for() {
         stack.layering.rule = rule;
         for cos in [0.9, 0.3, 0.04, -0.4] {
             let wo = at::<f64>(cos);
-            let part = |tree: &ClosureTree| -> Bsdf<'_, f64> {
+            let part = |tree: &ClosureTree| {
                 let w = V3::new(wo[0], wo[1], wo[2]);
-                flatten(tree, &Globals::default(), w, stack.layering, &stack.curves).expect("a small tree")
+                let bsdf = |_| -> Bsdf<'_, f64> {
+                    flatten(tree, &Globals::default(), w, stack.layering, &stack.curves).expect("a small tree")
+                };
+                albedo(&bsdf, Side::View, wo, Tolerance::default()).value
             };
             let shares = breakdown(&|w| stack.bsdf(w), wo, Tolerance::default());
-            let ledger = ledger(&stack.tree, part, stack.layering, wo, Tolerance::default());
+            let ledger = ledger(&stack.tree, part, stack.layering);
             let place = format!("{tint:?} {rule:?} {cos}: {ledger:?}");
             assert_eq!(ledger.layers.len(), 2, "{place}");
             for c in 0..3 {

@@ -59,6 +59,22 @@ const GAINED: &[(Tier, LayeringRule, f64, f64, &str)] = &[
         0.0,
         r#"layer(layer(phong(N, 2.27), oren_nayar_diffuse_bsdf(N, 0.187, 0.7266, "energy_compensation", 1)), transparent())"#,
     ),
+    // By 6 % and 1.5 %: facets that only reflect, or only refract, next to their total reflection: the step lies between two
+    // nodes of their tables.
+    (
+        Fast,
+        View,
+        -0.734,
+        24.0,
+        r#"layer(microfacet("ggx", N, vector(1, 0, 0), 0.0001, 0.0001, 1.5, 0), transparent())"#,
+    ),
+    (
+        Standard,
+        View,
+        0.9719,
+        69.0,
+        r#"layer(microfacet("ggx", N, vector(1, 0, 0), 0.0325, 0.0001, 0.25, 1), transparent())"#,
+    ),
 ];
 
 #[test]

@@ -69,20 +69,51 @@ fn its_hosts_run() {
     assert!(readme().contains("    sh examples/c/run.sh\n") && root.join("examples/c/run.sh").exists());
 }
 
+/// In the pages that show commands; `# 3` at the end of a line is the exit status it says.
 #[test]
-fn the_commands_of_the_audit_page_run() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(root.join("docs/audit.md")).expect("docs/audit.md");
-    let mut commands = 0;
-    for line in text.lines() {
-        let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
-        let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
-        let output = command.current_dir(root).args(arguments.split_whitespace()).output().expect("the program starts");
-        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        assert!(output.stdout.len() > 100, "{line}");
-        commands += 1;
+fn the_commands_of_the_pages_run() {
+    let (root, folder) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().expect("a folder"));
+    for page in ["audit.md", "guide.md"] {
+        let text = std::fs::read_to_string(root.join("docs").join(page)).expect(page);
+        let mut commands = 0;
+        for line in text.lines() {
+            let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
+            let (arguments, status) = arguments.split_once("  # ").unwrap_or((arguments, "0"));
+            let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
+            command.current_dir(root);
+            for argument in arguments.split_whitespace() {
+                // Pictures go elsewhere.
+                match argument.ends_with(".png") {
+                    true => command.arg(folder.path().join(argument)),
+                    false => command.arg(argument),
+                };
+            }
+            let output = command.output().expect("the program starts");
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), status.parse().ok(), "{page}: {line}: {message}");
+            assert!(output.stdout.len() + message.len() > 100 || arguments.contains(".png"), "{page}: {line}");
+            commands += 1;
+        }
+        assert!(commands >= 4, "{page}: {commands} commands");
     }
-    assert!(commands >= 4, "{commands} commands");
+}
+
+#[test]
+fn the_guides_scripts_compile_and_its_links_lead_somewhere() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let text = std::fs::read_to_string(docs.join("guide.md")).expect("docs/guide.md");
+    let script = text.split("```c\n").nth(1).and_then(|t| t.split("```").next()).expect("a script");
+    let shader = overcoat::Engine::new().compile("guide", script).expect("compiles");
+    assert!(shader.warnings().is_empty() && shader.params().len() == 2);
+    for link in text.split("](").skip(1) {
+        let target = link.split(')').next().expect("a target");
+        let heading = target.strip_prefix('#').map(|anchor| anchor.replace('-', " "));
+        let found = match heading {
+            Some(heading) => text.lines().any(|l| l.to_lowercase() == format!("## {heading}")),
+            None => docs.join(target).exists(),
+        };
+        assert!(found, "{target}");
+    }
 }
 
 #[test]

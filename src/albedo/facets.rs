@@ -298,6 +298,9 @@ impl FacetSpec {
     }
 }
 
+/// Steps within a cell in which a part jumps.
+const STEPS: usize = 8;
+
 /// Albedos over a table's nodes and half way between them.
 struct Fine {
     values: Vec<[Estimate; PARTS + 1]>,
@@ -406,7 +409,42 @@ impl Grid<'_> {
                 lifts[k] = std::array::from_fn(|c| lifts[k][c].max(1.25 * missed[c]));
             }
         }
+        for sheet in 0..tables.sheets {
+            for node in self.jumps(sheet) {
+                let missed = self.missed_within(tables, sheet, node);
+                for lift in &mut lifts[sheet * self.nodes + node..][..2] {
+                    *lift = std::array::from_fn(|c| lift[c].max(missed[c]));
+                }
+            }
+        }
         lifts
+    }
+
+    /// The cells, by their first node, in which a sheet's parts go over to total reflection too steeply for its nodes.
+    /// Only surfaces that are not stretched transmit, so that there is one row.
+    fn jumps(&self, sheet: usize) -> std::ops::Range<usize> {
+        let (Some(eta), Some([alpha, _])) = (self.spec.facet.beyond(sheet == 1), self.spec.alpha) else { return 0..0 };
+        let sin = eta.min(1.0);
+        let (critical, reach) = ((1.0 - sin * sin).sqrt(), 4.0 * alpha * sin);
+        let cell = |cos: f64| (cos.clamp(0.0, 1.0).sqrt().sqrt() * (self.nodes - 1) as f64) as usize;
+        let cells = cell(critical - reach)..(cell(critical + reach) + 1).min(self.nodes - 1);
+        if eta < 1.0 && self.rows == 1 && cells.len() <= 8 { cells } else { 0..0 }
+    }
+
+    /// By how much the truth may exceed what is read within the cell after a node. Parts rise or fall all the way there:
+    /// between two places none exceeds its larger end.
+    fn missed_within<S: Scalar>(&self, tables: &FacetTables<S>, sheet: usize, node: usize) -> [f64; PARTS + 1] {
+        let at = |step: usize| {
+            let (w, alpha) = self.at(sheet, 0.0, node as f64 + step as f64 / STEPS as f64);
+            let (truth, read) = (self.rule.albedos(self.spec, alpha, w), tables.view(w.map(S::c)));
+            std::array::from_fn(|c| match c {
+                0 => (0.0, 0.0),
+                _ => (truth[c].0 + truth[c].1, read[c - 1].to_f64()),
+            })
+        };
+        let places: Vec<[(f64, f64); PARTS + 1]> = (0..=STEPS).map(at).collect();
+        let missed = |c: usize, w: &[[(f64, f64); PARTS + 1]]| w[0][c].0.max(w[1][c].0) - w[0][c].1.min(w[1][c].1);
+        std::array::from_fn(|c| places.windows(2).map(|w| missed(c, w)).fold(0.0, f64::max))
     }
 
     /// Means of M as it is read, exactly: it is linear between nodes.

@@ -42,7 +42,7 @@ const EFFORTS: [usize; 2] = [1, 2];
 const TOLERANCE: Tolerance = Tolerance { error: 1e-5, evaluations: 600_000 };
 /// Where it does not agree with the estimate, both are repeated with more, and without stopping.
 const AGAIN: Tolerance = Tolerance { error: 1e-5, evaluations: 4_000_000 };
-const EFFORT_AGAIN: usize = 12;
+const EFFORT_AGAIN: usize = 24;
 
 const SIDES: [Side; 2] = [Side::View, Side::Light];
 

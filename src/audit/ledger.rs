@@ -5,12 +5,9 @@
 //! under the top is less, because `min` passes less than 1 − E_top and because bounds lie above albedos: that is lost.
 //! What a top does not scatter is not absorbed by it; it passes on.
 
-use super::cubature::Tolerance;
-use super::furnace::{Side, albedo};
-use crate::closure::{Bsdf, ClosureTree, Layering, Node, NodeId, TintRule};
+use crate::closure::{ClosureTree, Layering, Node, NodeId, TintRule};
 use crate::lobes::registry::LobeClass;
 use crate::lobes::{LobeKind, Rgb};
-use crate::optics::Scalar;
 
 /// What one layer does with the light offered to it. All per channel, as parts of the light that meets the material.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,18 +36,12 @@ pub struct Ledger {
     pub absorbed_by_lobes: Rgb<f64>,
 }
 
-/// Accounts for the light that leaves toward ωo = `wo`. `bsdf` gives the BSDF for `wo` of the tree and of its parts.
-pub fn ledger<'m, S: Scalar>(
-    tree: &ClosureTree,
-    bsdf: impl Fn(&ClosureTree) -> Bsdf<'m, S>,
-    layering: Layering,
-    wo: [S; 3],
-    tolerance: Tolerance,
-) -> Ledger {
+/// Accounts for the light that leaves toward one ωo: `albedo` measures E_view there of the tree and of its parts.
+pub fn ledger(tree: &ClosureTree, albedo: impl Fn(&ClosureTree) -> Rgb<f64>, layering: Layering) -> Ledger {
     let measure = |node: NodeId| {
         let mut part = tree.clone();
         part.set_root(node);
-        albedo(&|_| bsdf(&part), Side::View, wo, tolerance).value
+        albedo(&part)
     };
     let mut keeper = Keeper { tree, measure, layering, ledger: Ledger::default() };
     let mut waiting = vec![(tree.root(), [1.0; 3])];

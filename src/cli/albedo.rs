@@ -120,13 +120,16 @@ pub(super) fn explain<S: Evaluate>(
     let seen = Globals { i: glam::Vec3::from_array(w.map(|x| -x.to_f32())), ..*globals };
     let black = |_| Bsdf::black();
     let Ok(tree) = material.tree(&seen) else { return Value::Null };
-    let part = |tree: &ClosureTree| S::flatten(material, tree, &seen, w).unwrap_or_else(black);
-    let bsdf = part(&tree);
+    let bsdf = S::shade(material, &seen, w).unwrap_or_else(black);
     if bsdf.lobe_count() > MAX_EXPLAINED {
         return json!({ "note": format!("{} lobes are too many to tell apart", bsdf.lobe_count()) });
     }
     let shares = breakdown(&|_| S::shade(material, &seen, w).unwrap_or_else(black), w, tolerance);
-    let ledger = ledger(&tree, part, material.layering(), w, tolerance);
+    let part = |tree: &ClosureTree| {
+        let measured = |bsdf: &Bsdf<'_, S>| albedo(&|_| bsdf.clone(), Side::View, w, tolerance).value;
+        S::with_part(material, tree, &seen, w, measured).unwrap_or_default()
+    };
+    let ledger = ledger(&tree, part, material.layering());
     explained(&bsdf, &shares, &ledger, total)
 }
 

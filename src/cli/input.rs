@@ -177,13 +177,14 @@ pub trait Evaluate: Scalar {
     /// The BSDF at the default point, seen from `wo`.
     fn shade<'m>(material: &'m Material, globals: &Globals, wo: [Self; 3]) -> Result<Bsdf<'m, Self>, ShadeError>;
 
-    /// The BSDF of a part of the material's tree.
-    fn flatten<'m>(
-        material: &'m Material,
+    /// Shows `look` the BSDF of a part of the material's tree.
+    fn with_part<R>(
+        material: &Material,
         tree: &ClosureTree,
         globals: &Globals,
         wo: [Self; 3],
-    ) -> Result<Bsdf<'m, Self>, ShadeError>;
+        look: impl FnOnce(&Bsdf<'_, Self>) -> R,
+    ) -> Result<R, ShadeError>;
 }
 
 impl Evaluate for f32 {
@@ -191,13 +192,14 @@ impl Evaluate for f32 {
         material.shade(globals, wo.into())
     }
 
-    fn flatten<'m>(
-        material: &'m Material,
+    fn with_part<R>(
+        material: &Material,
         tree: &ClosureTree,
         globals: &Globals,
         wo: [f32; 3],
-    ) -> Result<Bsdf<'m, f32>, ShadeError> {
-        material.flatten(tree, globals, wo.into())
+        look: impl FnOnce(&Bsdf<'_, f32>) -> R,
+    ) -> Result<R, ShadeError> {
+        material.with_part(tree, globals, wo.into(), look)
     }
 }
 
@@ -206,13 +208,14 @@ impl Evaluate for f64 {
         material.shade_reference(globals, wo)
     }
 
-    fn flatten<'m>(
-        material: &'m Material,
+    fn with_part<R>(
+        material: &Material,
         tree: &ClosureTree,
         globals: &Globals,
         wo: [f64; 3],
-    ) -> Result<Bsdf<'m, f64>, ShadeError> {
-        material.flatten_reference(tree, globals, wo)
+        look: impl FnOnce(&Bsdf<'_, f64>) -> R,
+    ) -> Result<R, ShadeError> {
+        material.with_part_reference(tree, globals, wo, look)
     }
 }
 

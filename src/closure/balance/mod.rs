@@ -65,7 +65,7 @@ impl Unbalanced {
             Unbalanced::NotReciprocal => "the lobe is not reciprocal",
             Unbalanced::Tangent => "a tangent makes albedos depend on the azimuth",
             Unbalanced::Normal => "its normal is not that of the layers above",
-            Unbalanced::Crosses => "it scatters to the other side",
+            Unbalanced::Crosses => "it scatters to the other side, or from below",
             Unbalanced::Narrow => "it is too narrow to be solved for",
             Unbalanced::Delta => "one direction needs no balancing",
         }
