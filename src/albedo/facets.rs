@@ -371,8 +371,9 @@ impl Grid<'_> {
             .flat_map(move |r| [node / 2, node.div_ceil(2)].map(|n| (sheet * rows + r) * nodes + n))
     }
 
-    /// What M at the nodes is to be multiplied by, so that no probe reads more than is missing there. Where next to nothing
-    /// is missing at one node, lowering that one does not do.
+    /// What M at the nodes is to be multiplied by, so that neither a probe nor, for a quadratic, what lies half way from it
+    /// to a node reads more than is missing there. Where next to nothing is missing at one node, lowering that one does
+    /// not do.
     fn dimmed<S: Scalar>(&self, tables: &FacetTables<S>, fine: &[Fine]) -> Vec<f64> {
         let mut factors = vec![1.0f64; tables.sheets * self.rows * self.nodes];
         for probe in self.probes(tables.sheets) {
@@ -382,7 +383,7 @@ impl Grid<'_> {
             let (albedo, off) = fine[sheet].at(row, node)[0];
             let missing = (1.0 - albedo - off).max(0.0);
             if read > missing {
-                self.around(probe).for_each(|k| factors[k] = factors[k].min(missing / read));
+                self.around(probe).for_each(|k| factors[k] = factors[k].min((missing / read).powi(2)));
             }
         }
         factors

@@ -62,7 +62,7 @@ pub fn albedo_until<'m, S: Scalar>(
     let mut cells: Vec<Vec<Patch>> = charts.iter().map(unknown).collect();
     for lobe in (0..held.lobe_count()).filter(|lobe| held.lobe_kind(*lobe).0.class() == LobeClass::Scatter) {
         let index = group_of(&groups, held.lobe_frame(lobe), held.lobe_kind(lobe).0);
-        let hints = charts[index].hints(&held, lobe);
+        let hints = charts[index].hints(&held, lobe, tolerance);
         cells[index] = split(std::mem::take(&mut cells[index]), &hints, CROWD);
     }
     let f = |index: usize, x: f64, y: f64| {
@@ -99,7 +99,7 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
     (0..bsdf.lobe_count())
         .map(|lobe| {
             let chart = Group::of(bsdf.lobe_frame(lobe), bsdf.lobe_kind(lobe).0).chart(w);
-            let hints: Vec<[f64; 2]> = chart.hints(&bsdf, lobe).into_iter().map(|h| h.0).collect();
+            let hints: Vec<[f64; 2]> = chart.hints(&bsdf, lobe, tolerance).into_iter().map(|h| h.0).collect();
             let cells = split_at(&chart.cells(), &hints, CROWD);
             let of = |layered: bool| match bsdf.lobe_delta(lobe, layered) {
                 Some(part) => Albedo { value: part.map(S::to_f64), error: 0.0 },
@@ -118,6 +118,8 @@ pub fn breakdown<'m, S: Scalar>(subject: &impl Subject<'m, S>, w: [S; 3], tolera
 
 /// Directions of each lobe that tell where to look.
 const HINTS: usize = 256;
+/// And at least one for so many evaluations: what none of them shows may be missed.
+const PER_HINT: usize = 2000;
 /// More directions of one lobe than this in a cell are split up.
 const CROWD: usize = 64;
 
@@ -131,15 +133,15 @@ fn few(cell: &[f64; 4]) -> impl Iterator<Item = [f64; 2]> {
 
 /// Directions that one lobe sends light from (or toward) the held direction to, and how much of it each stands for: where
 /// to look for its peak.
-fn directions<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize) -> Vec<(V3<S>, f64)> {
+fn directions<S: Scalar>(held: &Bsdf<'_, S>, lobe: usize, count: usize) -> Vec<(V3<S>, f64)> {
     let sample = |k: usize| {
         // A rank-1 lattice in two dimensions.
         let u = [0.754_877_67, 0.569_840_29].map(|step: f64| S::c((0.5 + step * k as f64).fract()));
         let (w, pdf) = held.lobe_sample(lobe, u)?;
         let [r, g, b] = held.lobe_part(lobe, w, true).map(S::to_f64);
-        Some((w, r.max(g).max(b) / (pdf.to_f64() * HINTS as f64)))
+        Some((w, r.max(g).max(b) / (pdf.to_f64() * count as f64)))
     };
-    (0..HINTS).filter_map(sample).collect()
+    (0..count).filter_map(sample).collect()
 }
 
 /// Lobes that are integrated together, because their edges and ridges lie alike.
@@ -225,8 +227,9 @@ impl Layout {
 impl<S: Scalar> Chart<S> {
     /// Where the light of one lobe was seen to go, and how much of it each place stands for. More such places beside edges
     /// of the chart that a peak may lie across stand for nothing.
-    fn hints(&self, held: &Bsdf<'_, S>, lobe: usize) -> Vec<([f64; 2], f64)> {
-        let places = directions(held, lobe).into_iter().map(|(w, share)| (self.place(w), share));
+    fn hints(&self, held: &Bsdf<'_, S>, lobe: usize, tolerance: Tolerance) -> Vec<([f64; 2], f64)> {
+        let count = HINTS.max(tolerance.evaluations / PER_HINT);
+        let places = directions(held, lobe, count).into_iter().map(|(w, share)| (self.place(w), share));
         match self.layout {
             // The mirror direction lies where the azimuth begins and ends.
             Layout::AboutNormal { .. } => places

@@ -152,28 +152,14 @@ impl Checker<'_> {
                 self.error(d);
                 break;
             };
-            let slot = |slots: &[usize], ty| Some((slots.to_vec(), ty));
-            let found = match self.ast.name(key) {
-                "wrap" => slot(&[3, 4], Ty::String),
-                "swrap" => slot(&[3], Ty::String),
-                "twrap" => slot(&[4], Ty::String),
-                "firstchannel" => slot(&[5], Ty::Int),
-                "interp" => slot(&[6], Ty::String),
-                "colorspace" => slot(&[7], Ty::String),
-                "missingcolor" => slot(&[8], Ty::Color),
-                "missingalpha" => slot(&[9], Ty::Float),
-                "alpha" => {
-                    alpha = Some(given.ids[next + 1]);
-                    None
-                }
-                "blur" | "sblur" | "tblur" | "width" | "swidth" | "twidth" | "fill" | "subimage" | "time" | "rwrap"
-                | "errormessage" => None,
-                other => {
-                    let message = format!("`texture` has no option `{other}`");
-                    self.error(Diagnostic::error("E0302", self.span_of(given.ids[next]), message));
-                    None
-                }
-            };
+            let key = self.ast.name(key);
+            let found = texture_option(key);
+            if key == "alpha" {
+                alpha = Some(given.ids[next + 1]);
+            } else if found.is_none() && !IDLE_OPTIONS.contains(&key) {
+                let message = format!("`texture` has no option `{key}`");
+                self.error(Diagnostic::error("E0302", self.span_of(given.ids[next]), message));
+            }
             if let Some((slots, wants)) = found {
                 if ty.distance(wants).is_none() {
                     let message = format!("this option is {}, not {}", wants.name(), self.words(ty));
@@ -206,3 +192,22 @@ impl Checker<'_> {
         }
     }
 }
+
+/// The arguments of a task that an option of `texture` sets, and its type.
+fn texture_option(name: &str) -> Option<(&'static [usize], Ty)> {
+    Some(match name {
+        "wrap" => (&[3, 4], Ty::String),
+        "swrap" => (&[3], Ty::String),
+        "twrap" => (&[4], Ty::String),
+        "firstchannel" => (&[5], Ty::Int),
+        "interp" => (&[6], Ty::String),
+        "colorspace" => (&[7], Ty::String),
+        "missingcolor" => (&[8], Ty::Color),
+        "missingalpha" => (&[9], Ty::Float),
+        _ => return None,
+    })
+}
+
+/// Options of `texture` that change nothing here.
+const IDLE_OPTIONS: [&str; 11] =
+    ["blur", "sblur", "tblur", "width", "swidth", "twidth", "fill", "subimage", "time", "rwrap", "errormessage"];

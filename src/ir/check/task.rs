@@ -135,17 +135,7 @@ impl Checker<'_> {
                 let value = self.value_of(given, 1, *triple);
                 Some(self.result(Task::Between(kind(*triple)), vec![from, to, value], *triple, span))
             }
-            ("getmatrix", [Text, Matrix] | [Text, Text, Matrix]) => {
-                self.aside(given);
-                let from = self.value_of(given, 0, Text);
-                let to = if types.len() == 3 { self.value_of(given, 1, Text) } else { self.text("common", span) };
-                let out = self.allocate(Matrix);
-                let found = self.temporary(Int);
-                let outs = std::iter::once(found).chain((0..16).map(|i| VarId(out.base.0 + i))).collect();
-                self.deed(Task::Spaces, vec![from, to], outs, span);
-                self.write_result(given.ids[types.len() - 1], out, Matrix, span);
-                Some(self.back(found, Int, span))
-            }
+            ("getmatrix", [Text, Matrix] | [Text, Text, Matrix]) => Some(self.matrix_between(given, types.len(), span)),
             ("sincos", [angle, sin, cos]) if angle == sin && sin == cos && (angle.is_triple() || *angle == Float) => {
                 self.aside(given);
                 let ty = *angle;
@@ -192,6 +182,19 @@ impl Checker<'_> {
             }
             _ => None,
         }
+    }
+
+    /// `getmatrix(from, M)`, `getmatrix(from, to, M)`.
+    fn matrix_between(&mut self, given: &Given, count: usize, span: Span) -> Typed {
+        self.aside(given);
+        let from = self.value_of(given, 0, Ty::String);
+        let to = if count == 3 { self.value_of(given, 1, Ty::String) } else { self.text("common", span) };
+        let out = self.allocate(Ty::Matrix);
+        let found = self.temporary(Ty::Int);
+        let outs = std::iter::once(found).chain((0..16).map(|i| VarId(out.base.0 + i))).collect();
+        self.deed(Task::Spaces, vec![from, to], outs, span);
+        self.write_result(given.ids[count - 1], out, Ty::Matrix, span);
+        self.back(found, Ty::Int, span)
     }
 
     /// A task of converted arguments with one result.
