@@ -32,7 +32,6 @@ const BLOCK: u64 = 20_000_000;
 #[test]
 fn many_evaluations_of_random_materials_stay_sane_and_memory_flat() {
     let total: u64 = std::env::var("OVERCOAT_SOAK").map_or(200_000, |n| n.parse().expect("a number of evaluations"));
-    let coarse = Precision { ..Precision::FAST };
     // A short run is not to spend its time on tables.
     let coarse = Precision { cos_nodes: 16, axis_nodes: 8, polar: 12, azimuth: 8, ..Precision::FAST };
     let precision = if total < BLOCK { coarse } else { Precision::FAST };
