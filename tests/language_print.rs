@@ -26,7 +26,7 @@ fn printing_shows_how_operators_climb() {
     let printed = |text: &str| print::print(&parse(text));
     let expected = "float a=((1+(2*3))-(-4));(a=(a+=(b?c:(d?e:f))));(x=((a<<1)<(b&(c==d))));\n";
     assert_eq!(printed("float a = 1 + 2*3 - - 4; a = a += b ? c : d ? e : f; x = a<<1 < (b & c==d);"), expected);
-    assert_eq!(printed("if (!a.b[1]) { x++; } else --x;"), "if((!a.b[1])){(x++);}else (--x);\n");
+    assert_eq!(printed("if (!a.b[1]) { x++; } else --x;"), "if((!a.b[1])){(x++);}else {(--x);}\n");
 }
 
 #[test]
