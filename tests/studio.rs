@@ -415,3 +415,73 @@ fn a_newer_picture_stops_the_older() {
         assert!(long.last().is_some_and(|f| f.0["samples"] != 4096));
     });
 }
+
+/// Most memory the program ever held, in bytes, where the system tells.
+fn peak(studio: &Studio) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", studio.program.id())).unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:")).unwrap_or("0 kB");
+    line.trim().trim_end_matches(" kB").parse::<u64>().expect("a number") << 10
+}
+
+/// What client `k` asks, and that the answers are its own.
+fn asks_thrice(studio: &Studio, k: usize) {
+    let gray = (k + 1) as f64 / 64.0;
+    let body = json!({
+        "text": format!("surface s{k}(float g = {gray}) {{ Ci = g * diffuse(N); }}"),
+        "width": 24, "height": 16, "samples": 1, "slot": format!("client {k}"),
+    });
+    let compiled = studio.post("/api/compile", &body).json();
+    assert_eq!((&compiled["shader"], &compiled["ok"]), (&json!(format!("s{k}")), &json!(true)), "{compiled}");
+    assert!((compiled["parameters"][0]["default"].as_f64().expect("a number") - gray).abs() < 1e-6, "{compiled}");
+    let lobe = studio.post("/api/lobe", &body).json();
+    assert_eq!(lobe["shader"], format!("s{k}"));
+    assert!((lobe["albedo"][1].as_f64().expect("a number") - gray).abs() < 1e-4, "{lobe}");
+    let messages = studio.post("/api/render", &body).messages();
+    let (last, pixels) = messages.last().expect("a message");
+    assert_eq!((&last["kind"], &last["samples"]), (&json!("frame"), &json!(1)), "{last}");
+    assert_eq!(pixels.len(), 4 * 24 * 16);
+}
+
+#[test]
+#[ignore = "its second half has yet to be timed on an idle machine"]
+fn fifty_clients_at_once_and_a_million_lines_are_answered() {
+    let studio = Studio::open();
+    let begin = std::sync::Barrier::new(50);
+    std::thread::scope(|scope| {
+        for k in 0..50 {
+            let (studio, begin) = (&studio, &begin);
+            scope.spawn(move || {
+                begin.wait();
+                asks_thrice(studio, k);
+            });
+        }
+    });
+    let crowded = peak(&studio);
+    // A million lines are longer than a request may be, and refused in so many words.
+    let million = "Ci = Ci + diffuse(N);\n".repeat(1_000_000);
+    for path in ["/api/compile", "/api/render", "/api/save"] {
+        let refused = studio.post(path, &json!({ "path": "long.osl", "text": million }));
+        let reason = refused.json();
+        assert_eq!((refused.status, &reason["error"]), (413, &json!("a request may have 1048576 bytes")));
+    }
+    std::fs::write(studio.file("million.osl"), &million).expect("written");
+    assert_eq!(studio.get("/api/file?path=million.osl").status, 413);
+    let included = studio.post("/api/compile", &json!({ "text": "#include \"million.osl\"\nCi = diffuse(N);" })).json();
+    let told = &included["diagnostics"][0];
+    let message = told["message"].as_str().expect("a message");
+    assert_eq!((&included["ok"], &told["file"]), (&json!(false), &json!("million.osl")), "{included}");
+    assert_eq!(message, format!("the script has {} bytes; the limit is 1048576", million.len()));
+    // As long as a request may be: answered, whatever the answer, and soon.
+    let start = Instant::now();
+    let lines = |line: &str| line.repeat(1_000_000 / (line.len() + 1));
+    let blank = studio.post("/api/compile", &json!({ "text": format!("{}Ci = diffuse(N);", "\n".repeat(500_000)) }));
+    assert_eq!(blank.json()["ok"], true);
+    let long = studio.post("/api/compile", &json!({ "text": lines("Ci = Ci + diffuse(N);\n") })).json();
+    assert!(long["ok"] == true || !long["diagnostics"][0]["message"].as_str().expect("a message").is_empty(), "{long}");
+    let took = start.elapsed();
+    assert!(took < Duration::from_secs(30), "{took:?}");
+    let grown = peak(&studio);
+    println!("{} MiB for fifty clients, {} MiB for long scripts, which took {took:?}", crowded >> 20, grown >> 20);
+    assert!(grown < 1 << 30, "{} MiB", grown >> 20);
+    asks_thrice(&studio, 7);
+}

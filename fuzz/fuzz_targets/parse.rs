@@ -1,8 +1,4 @@
-//! Any text is a script or an error: `cargo +nightly fuzz run parse ../tests/corpus/osl`.
+//! See `overcoat_fuzz::parse`.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-
-fuzz_target!(|text: &str| {
-    let _ = overcoat::syntax::parse(text);
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| overcoat_fuzz::parse(bytes));

@@ -25,6 +25,10 @@ mod studio;
 mod tradeoff;
 mod tree;
 
+#[cfg(feature = "studio")]
+#[doc(hidden)]
+pub use studio::Desk;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;

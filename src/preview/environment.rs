@@ -6,10 +6,14 @@
 use glam::{Vec2, Vec3, vec2, vec3};
 use image::{ImageDecoder, ImageReader};
 use std::f32::consts::{PI, TAU};
+use std::io::{BufRead, Cursor, Seek};
 use std::path::Path;
 
 /// Infinities in a picture become this, the largest half float: that is where they usually come from.
 const BRIGHTEST: f32 = 65_504.0;
+
+/// What decoding a file may allocate, in bytes.
+const MOST_MEMORY: u64 = 1 << 30;
 
 /// Light by direction.
 pub struct Environment {
@@ -50,14 +54,31 @@ impl Environment {
     /// Reads a Radiance HDR or OpenEXR file. The error says why not, without the path.
     pub fn open(path: &Path) -> Result<Environment, String> {
         let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|e| e.to_string())?;
+        Environment::decode(reader, MOST_MEMORY)
+    }
+
+    /// [`open`](Self::open) for what a file holds, with a limit on the memory its picture may take: for tests that try
+    /// any bytes.
+    #[doc(hidden)]
+    pub fn from_bytes(bytes: &[u8], most_memory: u64) -> Result<Environment, String> {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+        Environment::decode(reader, most_memory)
+    }
+
+    fn decode(reader: ImageReader<impl BufRead + Seek>, most_memory: u64) -> Result<Environment, String> {
         match reader.format() {
             Some(image::ImageFormat::Hdr | image::ImageFormat::OpenExr) => {}
             _ => return Err("expected a Radiance HDR or an OpenEXR picture".into()),
         }
         let mut decoder = reader.into_decoder().map_err(|e| e.to_string())?;
         let mut limits = image::Limits::default();
-        limits.max_alloc = Some(1 << 30);
+        limits.max_alloc = Some(most_memory);
         decoder.set_limits(limits).map_err(|e| e.to_string())?;
+        // Decoders heed that for what they need besides; a header may claim a picture beyond any memory.
+        if decoder.total_bytes() > most_memory {
+            let (width, height) = decoder.dimensions();
+            return Err(format!("a picture of {width}×{height} pixels is beyond the limit of {most_memory} bytes"));
+        }
         let picture = image::DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         if width < 2 || height < 2 {

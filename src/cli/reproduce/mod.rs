@@ -12,13 +12,13 @@ pub(super) use variance::variances;
 
 use super::{Failure, Global, Outcome, output};
 use crate::engine::{Engine, Material};
-use crate::preview::output::save;
+use crate::preview::output::{replace, save};
 use crate::preview::plot::Plot;
 use crate::preview::{Control, Environment, Image, RenderSettings, Scene, Stage, Surface, strip};
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 #[derive(Args, Debug)]
@@ -172,12 +172,7 @@ impl Bench<'_> {
     /// Writes a text file whole, or leaves the old one.
     fn write(&self, file: &str, text: &str) -> Outcome {
         let path = self.args.dir.join(file);
-        let failed = |e: &dyn std::fmt::Display| Failure::usage(format!("cannot write `{}`: {e}", path.display()));
-        let folder: &Path = &self.args.dir;
-        let mut beside = tempfile::NamedTempFile::new_in(folder).map_err(|e| failed(&e))?;
-        std::io::Write::write_all(&mut beside, text.as_bytes()).map_err(|e| failed(&e))?;
-        beside.persist(&path).map_err(|e| failed(&e.error))?;
-        Ok(())
+        replace(&path, text.as_bytes()).map_err(|e| Failure::usage(e.to_string()))
     }
 }
 

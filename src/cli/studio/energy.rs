@@ -47,7 +47,7 @@ impl Wish {
 }
 
 /// Tells verdict, curves and shares, each as soon as it is known.
-pub fn account(workshop: &Workshop, wish: &Wish, mut stream: Stream) {
+pub fn account(workshop: &Workshop, wish: &Wish, mut stream: Stream<'_>) {
     guarded(&mut stream, |stream| {
         let compiled: Arc<Compiled> = workshop.material(&wish.script);
         let Ok((shader, material)) = &compiled.outcome else {

@@ -1,8 +1,8 @@
 //! As much of HTTP/1.1 as one page needs, read with limits: a head of 16 KiB, a body of 1 MiB, ten seconds for each.
 //!
-//! In: a connection. Out: a [`Head`] that can be judged before the body is read, then the body; back go a whole answer
-//! or a [`Stream`] of messages that ends with the connection. One request per connection: on the loopback a connection
-//! costs less than keeping count of one.
+//! In: a [`Link`], which is a connection or bytes in memory. Out: a [`Head`] that can be judged before the body is read,
+//! then the body; back go a whole answer or a [`Stream`] of messages that ends with the connection. One request per
+//! connection: on the loopback a connection costs less than keeping count of one.
 
 use serde_json::{Value, json};
 use std::io::{self, Read, Write};
@@ -17,6 +17,39 @@ pub const MAX_BODY: usize = 1 << 20;
 const PATIENCE: Duration = Duration::from_secs(10);
 /// How long it may take to read what it asked for.
 const WRITE_PATIENCE: Duration = Duration::from_secs(30);
+
+/// Where a request comes from and its answer goes. What is not a connection waits for nobody.
+pub trait Link: Read + Write {
+    /// How long the next read may wait.
+    fn wait_to_read(&mut self, _: Duration) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// How long writes may wait; what is written goes at once.
+    fn wait_to_write(&mut self, _: Duration) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Nothing more is written.
+    fn end(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Link for TcpStream {
+    fn wait_to_read(&mut self, patience: Duration) -> io::Result<()> {
+        self.set_read_timeout(Some(patience))
+    }
+
+    fn wait_to_write(&mut self, patience: Duration) -> io::Result<()> {
+        self.set_nodelay(true)?;
+        self.set_write_timeout(Some(patience))
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        self.shutdown(Shutdown::Write)
+    }
+}
 
 /// Why a request is not answered: a status and a sentence.
 #[derive(Debug)]
@@ -47,7 +80,7 @@ pub struct Head {
 
 impl Head {
     /// Reads up to the empty line.
-    pub fn read(stream: &mut TcpStream) -> Result<Head, Refusal> {
+    pub fn read(stream: &mut dyn Link) -> Result<Head, Refusal> {
         let start = Instant::now();
         let mut bytes = Vec::new();
         let mut chunk = [0; 4096];
@@ -103,7 +136,7 @@ impl Head {
     }
 
     /// Reads the body, if it is not too long.
-    pub fn body(&self, stream: &mut TcpStream) -> Result<Vec<u8>, Refusal> {
+    pub fn body(&self, stream: &mut dyn Link) -> Result<Vec<u8>, Refusal> {
         if self.has("transfer-encoding") {
             return Err(Refusal::new(411, "the request must say how long its body is"));
         }
@@ -129,10 +162,10 @@ impl Head {
     }
 }
 
-fn receive(stream: &mut TcpStream, chunk: &mut [u8], start: Instant) -> Result<usize, Refusal> {
+fn receive(stream: &mut dyn Link, chunk: &mut [u8], start: Instant) -> Result<usize, Refusal> {
     let slow = || Refusal::new(408, "the request took too long");
     let left = PATIENCE.checked_sub(start.elapsed()).filter(|left| !left.is_zero()).ok_or_else(slow)?;
-    stream.set_read_timeout(Some(left)).map_err(|e| Refusal::bad(e.to_string()))?;
+    stream.wait_to_read(left).map_err(|e| Refusal::bad(e.to_string()))?;
     stream.read(chunk).map_err(|_| slow())
 }
 
@@ -161,8 +194,8 @@ const POLICY: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n";
 
 /// Sends a whole answer.
-pub fn answer(mut stream: TcpStream, status: u16, kind: &str, body: &[u8]) -> io::Result<()> {
-    stream.set_write_timeout(Some(WRITE_PATIENCE))?;
+pub fn answer(stream: &mut dyn Link, status: u16, kind: &str, body: &[u8]) -> io::Result<()> {
+    stream.wait_to_write(WRITE_PATIENCE)?;
     let head = format!(
         "HTTP/1.1 {status} {}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n{POLICY}\r\n",
         phrase(status),
@@ -174,19 +207,19 @@ pub fn answer(mut stream: TcpStream, status: u16, kind: &str, body: &[u8]) -> io
 }
 
 /// Sends a JSON document.
-pub fn answer_json(stream: TcpStream, status: u16, value: &Value) -> io::Result<()> {
+pub fn answer_json(stream: &mut dyn Link, status: u16, value: &Value) -> io::Result<()> {
     answer(stream, status, "application/json", value.to_string().as_bytes())
 }
 
 /// Sends why there is no answer.
-pub fn refuse(stream: TcpStream, refusal: &Refusal) -> io::Result<()> {
+pub fn refuse(stream: &mut dyn Link, refusal: &Refusal) -> io::Result<()> {
     answer_json(stream, refusal.status, &json!({ "error": refusal.reason }))
 }
 
 /// Closes a connection whose client may still be sending: closing at once would make its system throw the answer away.
-fn finish(mut stream: TcpStream) -> io::Result<()> {
-    stream.shutdown(Shutdown::Write)?;
-    stream.set_read_timeout(Some(Duration::from_millis(200)))?;
+fn finish(stream: &mut dyn Link) -> io::Result<()> {
+    stream.end()?;
+    stream.wait_to_read(Duration::from_millis(200))?;
     let (start, mut chunk) = (Instant::now(), [0; 16 << 10]);
     while start.elapsed() < Duration::from_secs(2) && matches!(stream.read(&mut chunk), Ok(1..)) {}
     Ok(())
@@ -211,14 +244,13 @@ fn phrase(status: u16) -> &'static str {
 
 /// Messages, each sent as soon as it is there: the lengths of a JSON document and of the bytes that go with it, both as
 /// four bytes, least first; then the two.
-pub struct Stream {
-    out: TcpStream,
+pub struct Stream<'l> {
+    out: &'l mut dyn Link,
 }
 
-impl Stream {
-    pub fn open(mut out: TcpStream) -> io::Result<Stream> {
-        out.set_nodelay(true)?;
-        out.set_write_timeout(Some(WRITE_PATIENCE))?;
+impl<'l> Stream<'l> {
+    pub fn open(out: &'l mut dyn Link) -> io::Result<Stream<'l>> {
+        out.wait_to_write(WRITE_PATIENCE)?;
         let head = format!("HTTP/1.1 200 OK\r\nContent-Type: application/octet-stream\r\n{POLICY}\r\n");
         out.write_all(head.as_bytes())?;
         Ok(Stream { out })

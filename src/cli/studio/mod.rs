@@ -5,6 +5,7 @@
 //! the same again: [`workshop::Workshop::begin`]. Layers: `http` (bytes), `guard` (who may ask, for which files),
 //! `server` (what is asked), `workshop` (materials and stages that are kept), and one file per answer.
 
+mod desk;
 mod energy;
 mod guard;
 mod http;
@@ -20,6 +21,8 @@ mod workshop;
 
 #[cfg(test)]
 mod tests;
+
+pub use desk::Desk;
 
 use super::{Failure, Global, Outcome, output};
 use crate::preview::Scene;

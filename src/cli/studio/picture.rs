@@ -73,7 +73,7 @@ impl Wish {
 }
 
 /// Compiles, tells, and shows.
-pub fn show(workshop: &Workshop, wish: &Wish, mut stream: Stream) {
+pub fn show(workshop: &Workshop, wish: &Wish, mut stream: Stream<'_>) {
     guarded(&mut stream, |stream| {
         let compiled: Arc<Compiled> = workshop.material(&wish.script);
         if stream.send(&compiled.told(), &[]).is_err() {
@@ -94,7 +94,7 @@ enum Stopped {
     Failed(String),
 }
 
-fn refine(material: &Resting<'_>, wish: &Wish, stream: &mut Stream) -> Result<(), Stopped> {
+fn refine(material: &Resting<'_>, wish: &Wish, stream: &mut Stream<'_>) -> Result<(), Stopped> {
     let whole = &wish.scenery.pass;
     let pixels = f64::from(whole.width) * f64::from(whole.height);
     let shrink = (pixels / FIRST_PIXELS).sqrt();
@@ -130,7 +130,7 @@ fn expose(material: &Resting<'_>, wish: &Wish, pass: &Pass) -> Result<Rendered, 
     })
 }
 
-fn send(image: &Image, wish: &Wish, [samples, of]: [u32; 2], stream: &mut Stream) -> Result<(), Stopped> {
+fn send(image: &Image, wish: &Wish, [samples, of]: [u32; 2], stream: &mut Stream<'_>) -> Result<(), Stopped> {
     if wish.stop.load(Ordering::Relaxed) {
         return Err(Stopped::Unwanted);
     }

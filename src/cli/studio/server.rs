@@ -3,12 +3,12 @@
 //! One thread per connection, up to a limit. A panic while answering ends that answer and nothing else.
 
 use super::guard::Guard;
-use super::http::{self, Head, Refusal, Stream};
+use super::http::{self, Head, Link, Refusal, Stream};
 use super::material::Script;
 use super::workshop::Workshop;
 use super::{energy, picture, polar, watch, words};
 use serde_json::{Value, json};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpListener;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -41,16 +41,16 @@ const PAGE: &[(&str, &str, &str)] = &[
 pub fn serve(listener: &TcpListener, guard: &Arc<Guard>, workshop: &Arc<Workshop>) {
     let active = Arc::new(AtomicUsize::new(0));
     for connection in listener.incoming() {
-        let Ok(connection) = connection else { continue };
+        let Ok(mut connection) = connection else { continue };
         if active.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
             active.fetch_sub(1, Ordering::Relaxed);
             let _ = connection.set_nonblocking(true);
-            let _ = http::refuse(connection, &Refusal::new(503, "too many requests at a time"));
+            let _ = http::refuse(&mut connection, &Refusal::new(503, "too many requests at a time"));
             continue;
         }
         let (guard, workshop, count) = (guard.clone(), workshop.clone(), active.clone());
         let work = move || {
-            let _ = catch_unwind(AssertUnwindSafe(|| connected(connection, &guard, &workshop)));
+            let _ = catch_unwind(AssertUnwindSafe(|| connected(&mut connection, &guard, &workshop)));
             count.fetch_sub(1, Ordering::Relaxed);
         };
         if std::thread::Builder::new().stack_size(STACK).spawn(work).is_err() {
@@ -59,15 +59,15 @@ pub fn serve(listener: &TcpListener, guard: &Arc<Guard>, workshop: &Arc<Workshop
     }
 }
 
-fn connected(mut connection: TcpStream, guard: &Guard, workshop: &Workshop) {
-    let spare = connection.try_clone();
-    let outcome = catch_unwind(AssertUnwindSafe(|| match asked(&mut connection, guard) {
+/// Reads one request and answers it.
+pub fn connected(connection: &mut dyn Link, guard: &Guard, workshop: &Workshop) {
+    let outcome = catch_unwind(AssertUnwindSafe(|| match asked(connection, guard) {
         Ok(question) => answer(connection, &question, workshop),
         Err(refusal) => drop(http::refuse(connection, &refusal)),
     }));
     // Whatever was sent before the panic, the client is told no more than that something is wrong.
-    if let (Err(_), Ok(spare)) = (outcome, spare) {
-        let _ = http::refuse(spare, &Refusal::new(500, "this request crashed; the studio goes on"));
+    if outcome.is_err() {
+        let _ = http::refuse(connection, &Refusal::new(500, "this request crashed; the studio goes on"));
     }
 }
 
@@ -77,7 +77,7 @@ struct Question {
 }
 
 /// Reads a request and judges it; its body only if it may ask.
-fn asked(connection: &mut TcpStream, guard: &Guard) -> Result<Question, Refusal> {
+fn asked(connection: &mut dyn Link, guard: &Guard) -> Result<Question, Refusal> {
     let head = Head::read(connection)?;
     guard.check_origin(&head)?;
     if head.path.starts_with("/api/") {
@@ -94,9 +94,9 @@ fn asked(connection: &mut TcpStream, guard: &Guard) -> Result<Question, Refusal>
     Ok(Question { head, body })
 }
 
-fn answer(connection: TcpStream, question: &Question, workshop: &Workshop) {
+fn answer(connection: &mut dyn Link, question: &Question, workshop: &Workshop) {
     let Question { head, body } = question;
-    let whole = |connection, outcome: Result<Value, Refusal>| match outcome {
+    let whole = |connection: &mut dyn Link, outcome: Result<Value, Refusal>| match outcome {
         Ok(value) => http::answer_json(connection, 200, &value),
         Err(refusal) => http::refuse(connection, &refusal),
     };
@@ -127,7 +127,7 @@ fn answer(connection: TcpStream, question: &Question, workshop: &Workshop) {
 }
 
 /// Runs `work`, and sends what became of it where it panics.
-pub fn guarded(stream: &mut Stream, work: impl FnOnce(&mut Stream)) {
+pub fn guarded(stream: &mut Stream<'_>, work: impl FnOnce(&mut Stream<'_>)) {
     if catch_unwind(AssertUnwindSafe(|| work(stream))).is_err() {
         let message = "this computation crashed; the studio goes on. Please report the script";
         let _ = stream.send(&json!({ "kind": "failed", "message": message }), &[]);

@@ -57,7 +57,7 @@ pub fn watch(workshop: &Arc<Workshop>) -> notify::Result<impl Watcher + use<>> {
 }
 
 /// Sends the names of changed files, until the page goes.
-pub fn tell(workshop: &Workshop, mut stream: Stream) {
+pub fn tell(workshop: &Workshop, mut stream: Stream<'_>) {
     let (listener, changes) = channel();
     workshop.listen(listener);
     let mut alive = stream.send(&json!({ "kind": "watching" }), &[]).is_ok();

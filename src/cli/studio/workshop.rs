@@ -78,7 +78,7 @@ impl Workshop {
         }
     }
 
-    #[cfg(test)]
+    /// The same with an engine of one's choice.
     pub fn with_engine(self, engine: Engine) -> Workshop {
         Workshop { engine, ..self }
     }
