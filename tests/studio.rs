@@ -443,7 +443,6 @@ fn asks_thrice(studio: &Studio, k: usize) {
 }
 
 #[test]
-#[ignore = "its second half has yet to be timed on an idle machine"]
 fn fifty_clients_at_once_and_a_million_lines_are_answered() {
     let studio = Studio::open();
     let begin = std::sync::Barrier::new(50);

@@ -18,8 +18,15 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 /// Lobes that were chosen once.
 static POOL: LazyLock<Pool> = LazyLock::new(|| Pool::random(&mut rand_pcg::Pcg64Mcg::seed_from_u64(5)));
 
-/// Tables by tier, each made when a tree first asks for it, and kept.
-static KEPT: LazyLock<[(TableCache<f32>, Mutex<Curves<f32>>); 2]> = LazyLock::new(Default::default);
+/// A cache, and what keeps its tables from being dropped.
+#[derive(Default)]
+struct Kept {
+    cache: TableCache<f32>,
+    curves: Mutex<Curves<f32>>,
+}
+
+/// Tables by tier, each made when a tree first asks for it.
+static KEPT: LazyLock<[Kept; 2]> = LazyLock::new(Default::default);
 
 /// Coarse tables for two tiers: every run makes its own.
 const PRECISIONS: [Precision; 2] = [
@@ -29,7 +36,7 @@ const PRECISIONS: [Precision; 2] = [
 
 /// The tables of a tree.
 fn curves(tree: &ClosureTree, tier: usize) -> Curves<f32> {
-    let (cache, kept) = &KEPT[tier];
+    let Kept { cache, curves: kept } = &KEPT[tier];
     let mut curves = Curves::default();
     for (site, kind, _) in tree.lobes() {
         let table = kind.table(&POOL.entries()[site as usize].known);

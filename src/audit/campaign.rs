@@ -43,6 +43,8 @@ const TOLERANCE: Tolerance = Tolerance { error: 1e-5, evaluations: 600_000 };
 /// Where it does not agree with the estimate, both are repeated with more, and without stopping.
 const AGAIN: Tolerance = Tolerance { error: 1e-5, evaluations: 4_000_000 };
 const EFFORT_AGAIN: usize = 24;
+/// Where quadrature does not find what scatters within 1e-4 of the horizon, millions of samples decide.
+const EFFORTS_LAST: [usize; 2] = [72, 216];
 
 const SIDES: [Side; 2] = [Side::View, Side::Light];
 
@@ -275,6 +277,11 @@ impl Case {
         if self.verdict == Verdict::Unresolved && effort == Effort::Twice {
             let e = estimate(&subject, self.side, w, EFFORT_AGAIN, rng);
             self.integrate(&subject, w, e, AGAIN, |_| false);
+            for effort in EFFORTS_LAST {
+                if self.verdict == Verdict::Unresolved {
+                    self.judge(estimate(&subject, self.side, w, effort, rng), AGAIN);
+                }
+            }
         }
     }
 
@@ -288,6 +295,11 @@ impl Case {
     ) {
         self.method = Method::Integrated;
         self.albedo = albedo_until(subject, self.side, w, tolerance, enough);
+        self.judge(rough, tolerance);
+    }
+
+    /// What quadrature and samples say together.
+    fn judge(&mut self, rough: Estimate, tolerance: Tolerance) {
         let Albedo { value, error } = self.albedo;
         let largest = self.albedo.max();
         // As exact as was asked for, and the limit lies within the error: no gain as far as can be told. A difference
