@@ -26,8 +26,11 @@ const BASES: &[(&str, &str)] = &[
     ("GGX, α = 0.1", "microfacet_ggx(N, 0.1)"),
     ("GGX, α = 0.3", "microfacet_ggx(N, 0.3)"),
     ("GGX, α = 0.8", "microfacet_ggx(N, 0.8)"),
-    ("colored sum", "color(0.5, 0.2, 0) * eon(N, color(1, 0.5, 0.2), 0.5) + color(0.5, 0.8, 1) * diffuse(N)"),
-    ("colored sum", "color(0.5, 0.2, 0) * microfacet_ggx(N, 0.4) + color(0.5, 0.8, 1) * diffuse(N)"),
+    (
+        "EON + Lambert, colored",
+        "color(0.5, 0.2, 0) * eon(N, color(1, 0.5, 0.2), 0.5) + color(0.5, 0.8, 1) * diffuse(N)",
+    ),
+    ("GGX + Lambert, colored", "color(0.5, 0.2, 0) * microfacet_ggx(N, 0.4) + color(0.5, 0.8, 1) * diffuse(N)"),
 ];
 
 const COSINES: [f64; 12] = [1.0, 0.9, 0.75, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05, 0.01, 0.001];
