@@ -220,6 +220,10 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         if l.delta {
             let (local, _) = l.lobe.delta()?;
             let wi = frame.to_world(local);
+            if !is_unit(wi) {
+                // Seen along no direction, it has none to send light to.
+                return None;
+            }
             let f_cos = self.lobe_delta(index, true)?;
             let flags = SampleFlags { transmit: transmit(wi), delta: true, ..SampleFlags::default() };
             return Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local);
