@@ -15,6 +15,21 @@ const PORT: u16 = 1234;
 /// How many times a client reads before it hangs up: streams may be endless.
 const READS: usize = 12;
 
+impl Global {
+    /// No options, and nothing on the terminal.
+    pub(super) fn quiet() -> Global {
+        Global {
+            set: vec![],
+            tier: None,
+            layering: LayeringArg::Min,
+            tint_rule: TintArg::Largest,
+            include: vec![],
+            json: false,
+            quiet: true,
+        }
+    }
+}
+
 /// A studio on a folder, with budgets so small that every answer comes soon.
 #[doc(hidden)]
 pub struct Desk {
@@ -26,15 +41,7 @@ pub struct Desk {
 impl Desk {
     /// Opens a folder; tells why it cannot.
     pub fn open(folder: &Path) -> Result<Desk, String> {
-        let global = Global {
-            set: vec![],
-            tier: None,
-            layering: LayeringArg::Min,
-            tint_rule: TintArg::Largest,
-            include: vec![],
-            json: false,
-            quiet: true,
-        };
+        let global = Global::quiet();
         let opened = Folder::new(folder, true).map_err(|e| e.to_string())?;
         let limits = Limits {
             expanded_bytes: 1 << 16,

@@ -3,7 +3,7 @@
 use super::guard::{Folder, Guard};
 use super::server;
 use super::workshop::Workshop;
-use crate::cli::{Global, LayeringArg, TintArg};
+use crate::cli::Global;
 use crate::engine::Engine;
 use crate::lobes::host::{ClosureSpec, HostLobe};
 use serde_json::json;
@@ -26,15 +26,7 @@ impl HostLobe for Broken {
 #[test]
 fn a_panic_in_a_render_leaves_the_server_up() {
     let folder = tempfile::tempdir().expect("a folder");
-    let global = Global {
-        set: vec![],
-        tier: None,
-        layering: LayeringArg::Min,
-        tint_rule: TintArg::Largest,
-        include: vec![],
-        json: false,
-        quiet: true,
-    };
+    let global = Global::quiet();
     let spec = ClosureSpec::new("broken").normal("N", "Shading normal.");
     let engine = Engine::new().register(spec, Broken).expect("registers");
     let opened = Folder::new(folder.path(), true).expect("a folder");
