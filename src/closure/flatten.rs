@@ -8,7 +8,7 @@ use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
 use super::layer::{LayerStack, LayeringRule, TintRule, step};
 use super::sites::Site;
 use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
-use super::walk::{self, LobeVisit, Visitor, Weights, directions, first, walk};
+use super::walk::{self, LobeVisit, Stand, Visitor, Weights, first, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
@@ -280,12 +280,18 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
     }
 
     /// The frame of a lobe.
-    fn frame(&mut self, kind: LobeKind, values: &[f32]) -> u32 {
-        let (n, t) = directions(kind, values, self.globals);
+    #[inline(always)]
+    fn frame(&mut self, stand: Stand, values: &[f32]) -> u32 {
+        let (n, t) = stand.directions(values, self.globals);
         let same = |a: Vec3, b: Vec3| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits);
         if let Some(i) = self.standing.iter().position(|s| same(s.key.0, n) && same(s.key.1, t)) {
             return i as u32;
         }
+        self.new_frame((n, t))
+    }
+
+    #[inline(never)]
+    fn new_frame(&mut self, (n, t): (Vec3, Vec3)) -> u32 {
         let frame = walk::frame((n, t), self.globals);
         self.standing.push(Standing { key: (n, t), normal: frame.n, wo: frame.to_local(self.bsdf.wo) });
         self.bsdf.frames.push(frame);
@@ -336,24 +342,24 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
         let (curve, known) = self.curves.at(visit.site);
-        let known = known.filter(|k| k.is_of(visit.kind, visit.values));
-        let visit = match known {
-            Some(known) => LobeVisit { weights: known.tinted(visit.weights), ..visit },
-            None => visit.tinted(),
-        };
         let LobeVisit { kind, site, values, weights: w } = visit;
+        let known = known.filter(|k| k.is_of(kind, values));
+        let (tint, stand, class) = match known {
+            Some(known) => (known.tint, known.stand, known.class),
+            None => (Some(kind.weight(values)), Stand::of(kind, values), kind.class()),
+        };
+        let w = if let Some(tint) = tint { w.times(tint) } else { w };
         let met = self.met;
         self.met += 1;
         if first(w.total).iter().all(|w| *w <= S::zero()) && !w.inside {
             return;
         }
-        let frame = self.frame(kind, values);
+        let frame = self.frame(stand, values);
         let Standing { normal, wo, .. } = self.standing[frame as usize];
         let scale = self.stack.scale();
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
-        let class = kind.class();
         self.bsdf.lobes.push(FlatLobe {
             share: w.total,
             lobe: AnyLobe::nothing(),
@@ -386,7 +392,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             self.stack.lobe(first(w.in_top), bound);
         }
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
-            self.chained(|chain| chain.lobe(&visit, normal, param));
+            self.chained(|chain| chain.lobe(&LobeVisit { weights: w, ..visit }, normal, param));
         }
         if self.balance.is_some() {
             self.bsdf.balanced.push(balanced);

@@ -3,9 +3,9 @@
 //! Where a parameter block turns out to be the one that was prepared for, a lobe is turned toward ωo in place of being
 //! made from its parameters. The block is compared each time: nothing here need be told when a tree changes.
 
-use super::walk::Weights;
+use super::walk::Stand;
 use crate::albedo::AlbedoCurve;
-use crate::lobes::registry::ParamTy;
+use crate::lobes::registry::{LobeClass, ParamTy};
 use crate::lobes::{AnyLobe, LobeKind, Rgb32};
 use crate::optics::{Scalar, V3};
 
@@ -15,9 +15,10 @@ pub(super) struct Site<S: Scalar> {
     kind: LobeKind,
     /// Its block, and which bits of each slot count: none of a direction's, which shading may change.
     block: Vec<(u32, u32)>,
-    /// Its color.
-    weight: Rgb32,
-    white: bool,
+    /// Its color, [`LobeKind::weight`]; `None` if white.
+    pub tint: Option<Rgb32>,
+    pub stand: Stand,
+    pub class: LobeClass,
     /// Prepared for a viewer along the normal.
     lobe: AnyLobe<S>,
 }
@@ -37,7 +38,8 @@ impl<S: Scalar> Site<S> {
         let above = V3::new(S::zero(), S::zero(), S::one());
         let lobe = AnyLobe::new(kind, &values, above, curve);
         let weight = kind.weight(&values);
-        Some(Site { kind, block, weight, white: weight == [1.0; 3], lobe })
+        let tint = (weight != [1.0; 3]).then_some(weight);
+        Some(Site { kind, block, tint, stand: Stand::of(kind, &values), class: kind.class(), lobe })
     }
 
     /// The same with another table's numbers.
@@ -51,12 +53,6 @@ impl<S: Scalar> Site<S> {
     pub fn is_of(&self, kind: LobeKind, values: &[f32]) -> bool {
         let differs = |(value, (bits, counts)): (&f32, &(u32, u32))| (value.to_bits() ^ bits) & counts;
         self.kind == kind && values.iter().zip(&self.block).map(differs).fold(0, |all, d| all | d) == 0
-    }
-
-    /// `weights` with the lobe's color, [`LobeKind::weight`], among them.
-    #[inline(always)]
-    pub fn tinted(&self, weights: Weights<S>) -> Weights<S> {
-        if self.white { weights } else { weights.times(self.weight) }
     }
 
     /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters.

@@ -69,7 +69,8 @@ pub(super) trait Visitor<S> {
 
 enum Step<S> {
     Visit(NodeId, Weights<S>),
-    Middle(Weights<S>),
+    /// The base of a layer; the weights are the layer's.
+    Base(NodeId, Weights<S>),
     End,
 }
 
@@ -89,9 +90,7 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
                 }
                 Node::Mul(weight, c) => next = Some((c, w.times(weight))),
                 Node::Layer { top, base } => {
-                    steps.push(Step::End);
-                    steps.push(Step::Visit(base, w));
-                    steps.push(Step::Middle(w));
+                    steps.push(Step::Base(base, w));
                     next = Some((top, Weights { in_top: one, inside: true, ..w }));
                     visitor.begin();
                 }
@@ -103,22 +102,51 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
         }
         match steps.pop() {
             Some(Step::Visit(id, w)) => next = Some((id, w)),
-            Some(Step::Middle(w)) => visitor.middle(w),
+            Some(Step::Base(id, w)) => {
+                visitor.middle(w);
+                steps.push(Step::End);
+                next = Some((id, w));
+            }
             Some(Step::End) => visitor.end(),
             None => return,
         }
     }
 }
 
-/// The normal and the tangent a lobe asks for: its own, or the shading point's.
+/// Where a lobe finds the directions its frame is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stand {
+    /// First slots of its normal and of its tangent, if it has its own.
+    normal: Option<usize>,
+    tangent: Option<usize>,
+    /// See [`LobeKind::between_media`].
+    between_media: bool,
+}
+
+impl Stand {
+    #[inline]
+    pub fn of(kind: LobeKind, values: &[f32]) -> Self {
+        let spec = kind.spec();
+        let between_media = kind.between_media(values);
+        Stand { normal: spec.normal_slot(), tangent: spec.tangent_slot(), between_media }
+    }
+
+    /// The normal and the tangent the lobe asks for: its own, or the shading point's.
+    #[inline(always)]
+    pub fn directions(self, values: &[f32], globals: &Globals) -> (Vec3, Vec3) {
+        let vector = |slot: Option<usize>, default: Vec3| {
+            slot.and_then(|s| values.get(s..s + 3)).map_or(default, Vec3::from_slice)
+        };
+        let n = vector(self.normal, globals.n);
+        // Seen from inside, N was turned toward the viewer; a lobe between media knows its sides by the outside.
+        let n = if globals.backfacing && self.between_media { -n } else { n };
+        (n, vector(self.tangent, globals.dpdu))
+    }
+}
+
+/// [`Stand::directions`] of a lobe met for the first time.
 pub(super) fn directions(kind: LobeKind, values: &[f32], globals: &Globals) -> (Vec3, Vec3) {
-    let spec = kind.spec();
-    let vector =
-        |slot: Option<usize>, default: Vec3| slot.and_then(|s| values.get(s..s + 3)).map_or(default, Vec3::from_slice);
-    let n = vector(spec.normal_slot(), globals.n);
-    // Seen from inside, N was turned toward the viewer; a lobe between media knows its sides by the outside.
-    let n = if globals.backfacing && kind.between_media(values) { -n } else { n };
-    (n, vector(spec.tangent_slot(), globals.dpdu))
+    Stand::of(kind, values).directions(values, globals)
 }
 
 /// The frame that [`directions`] span.

@@ -58,10 +58,8 @@ pub(super) fn read_row<S: Real>(row: &[S], cos: S) -> [S; PARAMS] {
     let x = cos.clamp(S::zero(), S::one()).sqrt() * S::c((COS_NODES - 1) as f64);
     let i = x.whole().min(S::c((COS_NODES - 2) as f64));
     let start = i * S::c(PARAMS as f64);
-    std::array::from_fn(|p| {
-        let pick = |offset: usize| S::gather(row, start + S::c((offset * PARAMS + p) as f64));
-        (pick(1) - pick(0)).mul_add(x - i, pick(0))
-    })
+    let both: [S; 2 * PARAMS] = S::run(row, start);
+    std::array::from_fn(|p| (both[PARAMS + p] - both[p]).mul_add(x - i, both[p]))
 }
 
 /// A transformed cosine, turned toward ωo's azimuth, and the share of uniform directions mixed into it.

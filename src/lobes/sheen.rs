@@ -274,10 +274,10 @@ impl<S: Real> Sheen<S> {
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
+    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, known: &[S]) -> L {
         match self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
-            _ => self.value_apart(wi, terms),
+            _ => self.value_apart(wi, split(known).0),
         }
     }
 
@@ -462,7 +462,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.kept(wi, curve, self.value(wi, split(curve.extra()).0))
+        self.kept(wi, curve, self.value(wi, curve.extra()))
     }
 
     #[inline(always)]

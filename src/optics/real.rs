@@ -33,9 +33,9 @@ pub trait Real:
     /// A script value, taken as it is.
     fn from_f32(x: f32) -> Self;
 
-    /// The smaller of the two; the other one if one is NaN.
+    /// The smaller of the two; `o` if either is NaN.
     fn min(self, o: Self) -> Self;
-    /// The larger of the two; the other one if one is NaN.
+    /// The larger of the two; `o` if either is NaN.
     fn max(self, o: Self) -> Self;
     /// The value without its sign.
     fn abs(self) -> Self;
@@ -133,6 +133,15 @@ pub trait Lift<S>: Sized {
     /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
     fn gather(table: &[S], index: Self) -> Self;
 
+    /// `N` entries of `table` from `index` on; see [`gather`](Self::gather).
+    #[inline(always)]
+    fn run<const N: usize>(table: &[S], index: Self) -> [Self; N]
+    where
+        Self: Real,
+    {
+        std::array::from_fn(|k| Self::gather(table, index + Self::c(k as f64)))
+    }
+
     /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
     #[inline(always)]
     fn quartic(table: &[S], cells: S, x: Self) -> Self
@@ -142,7 +151,7 @@ pub trait Lift<S>: Sized {
         let cells = Self::lift(cells);
         let place = x.clamp(Self::zero(), Self::one()).sqrt().sqrt() * cells;
         let i = place.whole().min(cells - Self::one());
-        let (a, b) = (Self::gather(table, i), Self::gather(table, i + Self::one()));
+        let [a, b] = Self::run(table, i);
         Self::select(x.gt(Self::zero()), (b - a).mul_add(place - i, a), Self::zero())
     }
 }
