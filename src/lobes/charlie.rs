@@ -9,7 +9,7 @@
 
 use super::charlie_terms::TERMS;
 use crate::albedo::quadrature::Rule;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Real, V3, octaves};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 /// The distribution D for one roughness.
@@ -77,6 +77,14 @@ impl<S: Real> FittedLambda<S> {
         FittedLambda { twice_l_half: S::c(2.0) * fit.l(S::c(0.5)), ..fit }
     }
 
+    /// L for single precision: a power less for every direction, within 2e-6.
+    pub(crate) fn cubics(&self) -> Vec<f64>
+    where
+        f64: Lift<S>,
+    {
+        octaves::fit(|x| self.l::<f64>(x))
+    }
+
     /// L(x) of eq. 3.
     #[inline(always)]
     fn l<L: Real + Lift<S>>(&self, x: L) -> L {
@@ -87,8 +95,15 @@ impl<S: Real> FittedLambda<S> {
     /// ln Λ(μ), eq. 3.
     #[inline(always)]
     pub fn ln_lambda<L: Real + Lift<S>>(&self, cos: L) -> L {
+        self.ln_lambda_read(cos, &[])
+    }
+
+    /// [`ln_lambda`](Self::ln_lambda), L read from [`cubics`](Self::cubics) where there are any.
+    #[inline(always)]
+    pub(crate) fn ln_lambda_read<L: Real + Lift<S>>(&self, cos: L, cubics: &[S]) -> L {
         let low = cos.lt(L::c(0.5));
-        let l = self.l(L::select(low, cos, L::one() - cos));
+        let x = L::select(low, cos, L::one() - cos);
+        let l = L::octaves(cubics, x).unwrap_or_else(|| self.l(x));
         L::select(low, l, L::lift(self.twice_l_half) - l)
     }
 }

@@ -29,9 +29,9 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb, each_lane};
+use super::{Lobe, LobeKind, Rgb, each_lane, each_lane_with};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{F32x8, Lift, Real, V3};
+use crate::optics::{F32x8, Lift, Real, V3, octaves};
 
 closure! {
     /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
@@ -193,6 +193,14 @@ struct FittedFor<S> {
     soften: S,
 }
 
+impl<S: Real> FittedFor<S> {
+    /// ln Λ before it is softened.
+    #[inline(always)]
+    fn ln_lambda<L: Real + Lift<S>>(&self, w: V3<L>, known: &[S]) -> L {
+        self.fit.ln_lambda_read(w.z.clamp(L::c(MIN_COS), L::one()), split(known).cubics)
+    }
+}
+
 /// How fibres hide each other, prepared for ωo.
 #[derive(Clone, Copy, Debug)]
 enum Shadowing<S> {
@@ -240,7 +248,7 @@ impl<S: Real> Sheen<S> {
             CharlieV => Shadowing::Visibility,
             Zeltner => Shadowing::Transformed { albedo: S::zero() },
         };
-        let params = match split(known).1 {
+        let params = match split(known).row {
             [] => ltc::read(variant.table(), wo.z, r),
             row => ltc::read_row(row, wo.z),
         };
@@ -256,11 +264,11 @@ impl<S: Real> Sheen<S> {
         let shadowing = match self.shadowing {
             Shadowing::Fitted(fitted) => {
                 let cos = wo.z.clamp(S::c(MIN_COS), S::one());
-                let lambda_o = S::one() + fitted.fit.ln_lambda(cos).exp();
+                let lambda_o = S::one() + fitted.ln_lambda(wo, known).exp();
                 Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / cos, ..fitted })
             }
             Shadowing::Exact { exact, .. } => {
-                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), split(known).0);
+                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), split(known).terms);
                 Shadowing::Exact { exact, cos_lambda_o }
             }
             Shadowing::Visibility => Shadowing::Visibility,
@@ -276,17 +284,17 @@ impl<S: Real> Sheen<S> {
     #[inline(always)]
     fn value<L: Real + Lift<S>>(&self, wi: V3<L>, known: &[S]) -> L {
         match self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
-            _ => self.value_apart(wi, split(known).0),
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, fitted.ln_lambda(wi, known)),
+            _ => self.value_apart(wi, known),
         }
     }
 
     /// Apart, so that the default model stays short.
     #[inline(never)]
-    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, terms: &[S]) -> L {
+    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, known: &[S]) -> L {
         match self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi),
-            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, terms),
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, fitted.ln_lambda(wi, known)),
+            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, split(known).terms),
             Shadowing::Visibility => self.visible(wi),
             Shadowing::Transformed { albedo } => self.transformed(albedo, wi),
         }
@@ -305,12 +313,13 @@ impl<S: Real> Sheen<S> {
     }
 
     #[inline(always)]
-    fn fitted<L: Real + Lift<S>>(&self, FittedFor { fit, lambda_o, scale, soften }: FittedFor<S>, wi: V3<L>) -> L {
+    fn fitted<L: Real + Lift<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, ln_lambda: L) -> L {
+        let FittedFor { lambda_o, scale, soften, .. } = fitted;
         let cos = wi.z.clamp(L::c(MIN_COS), L::one());
         // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
         let grazing = (L::one() - cos).sq().sq().sq();
         let softened = L::lift(soften).mul_add(grazing, L::one());
-        let lambda_i = (fit.ln_lambda(cos) * softened).exp();
+        let lambda_i = (ln_lambda * softened).exp();
         self.above(wi, self.d(wi) * L::lift(scale) / (cos * (L::lift(lambda_o) + lambda_i)))
     }
 
@@ -359,7 +368,7 @@ impl<S: Real> Sheen<S> {
     }
 
     /// For [`CurveSpec::extra`]: the coefficients of the exact Λ, where it may be asked for; then, of a lobe that is all
-    /// known, its row of the transformed cosines.
+    /// known, its row of the transformed cosines and the cubics of its fitted Λ. [`split`] takes them apart.
     fn extra(key: &[f64; 4], axis: Option<Axis>) -> Vec<f64> {
         let mask = key[1] as u32;
         let mut known = match axis {
@@ -368,21 +377,40 @@ impl<S: Real> Sheen<S> {
             None => charlie::terms_at(key[0]).to_vec(),
         };
         if axis.is_none() && mask.is_power_of_two() {
-            known.extend(ltc::row(Variant::ALL[mask.trailing_zeros() as usize].table(), key[0]));
+            let variant = Variant::ALL[mask.trailing_zeros() as usize];
+            known.extend(ltc::row(variant.table(), key[0]));
+            match variant {
+                Softened | Fitted => known.extend(FittedLambda::published(key[0]).cubics()),
+                RefitSoftened | Refit => known.extend(FittedLambda::refitted(key[0]).cubics()),
+                Exact | CharlieV | Zeltner => {}
+            }
         }
         known
     }
 }
 
-/// The coefficients and the row that [`Sheen::extra`] gave; either may be empty.
+/// What [`Sheen::extra`] gave; each may be empty.
+struct Known<'a, S> {
+    terms: &'a [S],
+    row: &'a [S],
+    cubics: &'a [S],
+}
+
 #[inline(always)]
-fn split<S>(known: &[S]) -> (&[S], &[S]) {
-    let row = matches!(known.len(), ROW | ROW_AFTER_TERMS);
-    known.split_at(if row { known.len() - ROW } else { known.len() })
+fn split<S>(known: &[S]) -> Known<'_, S> {
+    let [terms, row] = match known.len() {
+        ROW | ROW_BEFORE_CUBICS => [0, ROW],
+        ROW_AFTER_TERMS => [charlie::COS_TERMS, ROW],
+        all => [all, 0],
+    };
+    let (terms, rest) = known.split_at(terms);
+    let (row, cubics) = rest.split_at(row);
+    Known { terms, row, cubics }
 }
 
 const ROW: usize = ltc::COS_NODES * ltc::PARAMS;
 const ROW_AFTER_TERMS: usize = charlie::COS_TERMS + ROW;
+const ROW_BEFORE_CUBICS: usize = ROW + 4 * octaves::CELLS;
 
 /// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
 #[inline(always)]
@@ -454,7 +482,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     #[inline(always)]
     fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
         let (known, excess) = (curve.extra(), curve.excess(wo, self.roughness));
-        match split(known).1 {
+        match split(known).row {
             [] => None,
             row => Some(Sheen { excess, ..self.aimed(wo, ltc::read_row(row, wo.z), known) }),
         }
@@ -472,9 +500,13 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         F32x8: Lift<S>,
     {
         let value = match self.shadowing {
-            Shadowing::Fitted(fitted) => each_lane(wi, |w| self.fitted(fitted, w)),
+            Shadowing::Fitted(fitted) => {
+                // Apart, because it reads a table.
+                let ln_lambda = fitted.ln_lambda::<F32x8>(*wi, curve.extra());
+                each_lane_with(wi, ln_lambda, |w, ln_lambda| self.fitted(fitted, w, ln_lambda))
+            }
             Shadowing::Exact { exact, cos_lambda_o } => {
-                let terms = split(curve.extra()).0;
+                let terms = split(curve.extra()).terms;
                 each_lane(wi, |w| self.exact(exact, cos_lambda_o, w, terms))
             }
             Shadowing::Visibility => each_lane(wi, |w| self.visible(w)),

@@ -1,7 +1,7 @@
 //! `Real` for f64, f32 and eight f32 side by side.
 
-use super::elementary;
 use super::real::{Lift, Real, Scalar};
+use super::{elementary, octaves};
 use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
 macro_rules! shared_scalar {
@@ -357,6 +357,27 @@ impl Lift<f32> for F32x8 {
     fn gather(table: &[f32], index: Self) -> Self {
         index.map(|i| <f32 as Lift<f32>>::gather(table, i))
     }
+    /// In three loops, like [`quartic`](Self::quartic).
+    #[inline(always)]
+    fn octaves(table: &[f32], x: Self) -> Option<Self> {
+        let cubics = table.as_chunks::<4>().0;
+        if cubics.len() != octaves::CELLS {
+            return None;
+        }
+        let (mut cell, mut t) = ([0; 8], [0.0; 8]);
+        for k in 0..8 {
+            (cell[k], t[k]) = octaves::place(x.0[k]);
+        }
+        let mut read = [[0.0; 4]; 8];
+        for k in 0..8 {
+            read[k] = *cubics.get(cell[k] as usize).unwrap_or(&[0.0; 4]);
+        }
+        let mut out = [0.0; 8];
+        for k in 0..8 {
+            out[k] = octaves::cubic(read[k], t[k]);
+        }
+        Some(F32x8(out))
+    }
     /// In three loops: the one in the middle, which reads, cannot become vector code, and would keep the rest from it.
     #[inline(always)]
     fn quartic(table: &[f32], cells: f32, x: Self) -> Self {
@@ -404,6 +425,12 @@ impl Lift<f32> for f32 {
     #[inline(always)]
     fn run<const N: usize>(table: &[f32], index: f32) -> [f32; N] {
         table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
+    }
+    #[inline(always)]
+    fn octaves(table: &[f32], x: f32) -> Option<f32> {
+        let (cell, t) = octaves::place(x);
+        let cubics = table.as_chunks().0;
+        (cubics.len() == octaves::CELLS).then(|| octaves::cubic(*cubics.get(cell as usize).unwrap_or(&[0.0; 4]), t))
     }
 }
 

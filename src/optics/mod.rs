@@ -7,6 +7,7 @@ pub mod frame;
 pub mod fresnel;
 pub mod lanes;
 pub mod microfacet;
+pub(crate) mod octaves;
 pub mod real;
 pub mod sampling;
 pub mod vec3;

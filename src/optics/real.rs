@@ -142,6 +142,13 @@ pub trait Lift<S>: Sized {
         std::array::from_fn(|k| Self::gather(table, index + Self::c(k as f64)))
     }
 
+    /// Cubics over the eighths of octaves below 1: see [`octaves`](super::octaves). `None` if the type has more digits than they.
+    #[inline(always)]
+    fn octaves(table: &[S], x: Self) -> Option<Self> {
+        let _ = (table, x);
+        None
+    }
+
     /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
     #[inline(always)]
     fn quartic(table: &[S], cells: S, x: Self) -> Self
