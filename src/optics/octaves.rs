@@ -2,7 +2,8 @@
 //! powers do, evenly over each octave.
 //!
 //! Cells are the eighths of octaves from 2⁻²⁴ up to 1; what lies below reads as 2⁻²⁴. For x^0.2 the cubics are within
-//! 1e-7 relatively. In single precision alone: there they are as good as the function.
+//! 1e-7 relatively, and with the rounding of single precision within 2.5e-7: as good as the function is there. For
+//! single precision alone.
 
 /// Octaves below 1.
 const OCTAVES: u32 = 24;
@@ -62,7 +63,7 @@ mod tests {
         while x > 1e-7 {
             let truth = f64::from(x).powf(0.2);
             let ours = <f32 as Lift<f32>>::octaves(&table, x).expect("a table");
-            assert!((f64::from(ours) / truth - 1.0).abs() < 1.5e-7, "{x}: {ours} for {truth}");
+            assert!((f64::from(ours) / truth - 1.0).abs() < 2.5e-7, "{x}: {ours} for {truth}");
             let lanes = F32x8::octaves(&table, F32x8([x; 8])).expect("a table");
             assert_eq!(lanes.0, [ours; 8]);
             x *= 0.9993;
