@@ -11,6 +11,7 @@ use overcoat::preview::{
     View, display, drape_mesh, render, strip,
 };
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::io::Cursor;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -242,6 +243,41 @@ fn environment_samples_carry_their_own_density_and_radiance() {
     let estimate = sum / 10_000.0;
     assert!((estimate / expected - 1.0).abs() < 0.01, "{estimate} {expected}");
     assert!(Environment::from_pixels(2, 2, vec![Vec3::ZERO; 4]).sample([0.5, 0.5]).is_none());
+}
+
+/// A picture whose header claims more pixels than any memory holds is an error, and nothing is set aside for it.
+#[test]
+fn environments_that_claim_too_much_are_refused() {
+    let claim = |width: i32, height: i32| {
+        let mut file = Cursor::new(Vec::new());
+        image::DynamicImage::from(image::Rgb32FImage::new(4, 2))
+            .write_to(&mut file, image::ImageFormat::OpenExr)
+            .unwrap();
+        let mut bytes = file.into_inner();
+        // An attribute is its name, its type, its size and its numbers.
+        let mut set = |name: &str, first: usize, numbers: &[i32]| {
+            let at = bytes.windows(name.len()).position(|w| w == name.as_bytes()).expect("an attribute");
+            for (k, number) in numbers.iter().enumerate() {
+                let at = at + name.len() + 4 + 4 * (first + k);
+                bytes[at..at + 4].copy_from_slice(&number.to_le_bytes());
+            }
+        };
+        // The last pixel, inclusive, and how many tiles that makes.
+        set("dataWindow\0box2i\0", 2, &[width - 1, height - 1]);
+        set("displayWindow\0box2i\0", 2, &[width - 1, height - 1]);
+        let tiles = (width as u64).div_ceil(64) * (height as u64).div_ceil(64);
+        set("chunkCount\0int\0", 0, &[tiles as i32]);
+        Environment::from_bytes(&bytes, 1 << 30).err()
+    };
+    assert_eq!(claim(4, 2), None);
+    let refused = claim(100_000, 50_000).expect("60 GB");
+    assert!(refused.contains("100000×50000 pixels is beyond the limit"), "{refused}");
+    for (width, height) in [(i32::MAX, i32::MAX), (i32::MAX, 2), (4, i32::MAX)] {
+        assert!(claim(width, height).is_some(), "{width}×{height}");
+    }
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 100000\n";
+    let refused = Environment::from_bytes(hdr, 1 << 30).err().expect("60 GB");
+    assert!(refused.contains("beyond the limit"), "{refused}");
 }
 
 fn drape() -> &'static Mesh {
