@@ -39,12 +39,15 @@ pub struct CurveSpec {
     /// The curve is that of the divided lobe.
     pub bounded: bool,
     /// Numbers the lobe wants beside its albedos, from the key and the axis; see [`AlbedoCurve::extra`].
-    pub extra: fn(&[f64; 4], Option<Axis>) -> Vec<f64>,
+    pub extra: fn(&[f64; 4], Option<Axis>) -> Extra<f64>,
 }
 
+/// Tables of a lobe's own, beside its albedos; which is for what, the lobe knows.
+pub type Extra<S> = [Vec<S>; 5];
+
 /// For [`CurveSpec::extra`]: nothing.
-pub fn no_extra(_: &[f64; 4], _: Option<Axis>) -> Vec<f64> {
-    vec![]
+pub fn no_extra(_: &[f64; 4], _: Option<Axis>) -> Extra<f64> {
+    Extra::default()
 }
 
 impl PartialEq for CurveSpec {
@@ -106,7 +109,7 @@ pub struct AlbedoCurve<S> {
     /// Empty unless [`CurveSpec::bounded`].
     excess: Vec<S>,
     /// What [`CurveSpec::extra`] gave.
-    extra: Vec<S>,
+    extra: Extra<S>,
     cos_nodes: usize,
     rows: usize,
     /// Cells over the cosine, and over the varying parameter.
@@ -131,7 +134,7 @@ where
             bound: vec![],
             view_bound: vec![],
             excess: vec![],
-            extra: vec![],
+            extra: Extra::default(),
             cos_nodes: 0,
             rows: 0,
             cells: [S::zero(); 2],
@@ -157,7 +160,7 @@ impl<S: Scalar> AlbedoCurve<S> {
             bound: all(&self.bound),
             view_bound: all(&self.view_bound),
             excess: all(&self.excess),
-            extra: all(&self.extra),
+            extra: self.extra.each_ref().map(|e| all(e)),
             cos_nodes: self.cos_nodes,
             rows: self.rows,
             cells: self.cells.map(|n| T::c(n.to_f64())),
@@ -203,7 +206,7 @@ impl<S: Real> AlbedoCurve<S> {
 
     /// What the lobe asked for beside its albedos; empty if it asked for nothing.
     #[inline(always)]
-    pub fn extra(&self) -> &[S] {
+    pub fn extra(&self) -> &Extra<S> {
         &self.extra
     }
 
@@ -242,8 +245,8 @@ impl<S: Real> AlbedoCurve<S> {
 
     /// Memory the tables take.
     pub fn bytes(&self) -> usize {
-        [&self.view, &self.bound, &self.view_bound, &self.excess, &self.extra].map(Vec::len).iter().sum::<usize>()
-            * size_of::<S>()
+        let own = [&self.view, &self.bound, &self.view_bound, &self.excess];
+        own.into_iter().chain(&self.extra).map(Vec::len).sum::<usize>() * size_of::<S>()
             + self.fibre.bytes()
             + self.facets.bytes()
     }
@@ -289,7 +292,7 @@ impl<S: Real> AlbedoCurve<S> {
 impl CurveSpec {
     /// Integrates the albedos at the nodes, then measures the interpolation between them and lifts the bound by it.
     pub fn bake<S: Scalar>(&self, precision: Precision) -> AlbedoCurve<S> {
-        let extra = (self.extra)(&self.key, self.axis).into_iter().map(S::c).collect();
+        let extra = (self.extra)(&self.key, self.axis).map(|e| e.into_iter().map(S::c).collect());
         let raw = AlbedoCurve { extra, ..self.bake_with(precision, &AlbedoCurve::default()) };
         if !self.bounded {
             return raw;
@@ -322,7 +325,7 @@ impl CurveSpec {
             bound: albedos.iter().map(|a| S::c(a.bound())).collect(),
             view_bound: vec![],
             excess: vec![],
-            extra: vec![],
+            extra: Extra::default(),
             cos_nodes: n,
             rows,
             cells: [n, rows].map(|n| S::c((n - 1) as f64)),

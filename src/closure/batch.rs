@@ -90,10 +90,12 @@ fn eight(bsdf: &Bsdf<'_>, wi: &[[f32; 3]; LANES], out: &mut [Eval; LANES], state
             }
         }
     }
-    let [r, g, b, pdf] = state.sum;
-    let f_cos = [r, g, b].map(finite);
+    for f in &mut state.sum[..3] {
+        *f = finite(*f);
+    }
+    let [r, g, b, pdf] = &state.sum;
     for i in 0..LANES {
-        out[i] = Eval { f_cos: f_cos.map(|f| f.0[i]), pdf: pdf.0[i] };
+        out[i] = Eval { f_cos: [r.0[i], g.0[i], b.0[i]], pdf: pdf.0[i] };
     }
 }
 

@@ -36,12 +36,38 @@ impl<S: Real> Fibres<S> {
     }
 }
 
+impl Fibres<f64> {
+    /// D over sin²θh as cubics, for [`read_d`]; empty where its exponent is too large for them.
+    pub(crate) fn cubics(&self) -> Vec<f64> {
+        if self.exponent <= 7.2 { octaves::fit::<64, 5>(|sin2| self.d(1.0 / sin2 - 1.0)) } else { vec![] }
+    }
+}
+
+/// D at sin²θh from [`Fibres::cubics`]: a logarithm and an exponential less. `None` if there are none.
+#[inline(always)]
+pub(crate) fn read_d<S, L: Real + Lift<S>>(cubics: &[S], sin2: L) -> Option<L> {
+    L::octaves::<64, 5, 2048>(cubics, sin2)
+}
+
+/// sin² of the angle between the half vector of `wo` and `wi` and the normal.
+#[inline(always)]
+pub(crate) fn half_sin2<L: Real>(wo: V3<L>, wi: V3<L>) -> L {
+    let (along, across) = half_squares(wo, wi);
+    across / (along + across).max(L::c(1e-30))
+}
+
+/// h·h for h = ωo + ωi, the part along the normal and the part across.
+#[inline(always)]
+fn half_squares<L: Real>(wo: V3<L>, wi: V3<L>) -> (L, L) {
+    let h = wo + wi;
+    (h.z * h.z, h.x.mul_add(h.x, h.y * h.y))
+}
+
 /// cot² of the angle between the half vector of `wo` and `wi` and the normal; huge where they coincide.
 #[inline(always)]
 pub fn half_cot2<L: Real>(wo: V3<L>, wi: V3<L>) -> L {
-    let h = wo + wi;
-    let across = h.x.mul_add(h.x, h.y * h.y);
-    (h.z * h.z / across.max(L::c(1e-30))).min(L::c(1e12))
+    let (along, across) = half_squares(wo, wi);
+    (along / across.max(L::c(1e-30))).min(L::c(1e12))
 }
 
 /// The paper's fit of ln Λ, eq. 3: L(x) = a/(1 + b·x^c) + d·x + e below cos θ = ½ and mirrored above.
@@ -77,14 +103,6 @@ impl<S: Real> FittedLambda<S> {
         FittedLambda { twice_l_half: S::c(2.0) * fit.l(S::c(0.5)), ..fit }
     }
 
-    /// L for single precision: a power less for every direction, within 2e-6.
-    pub(crate) fn cubics(&self) -> Vec<f64>
-    where
-        f64: Lift<S>,
-    {
-        octaves::fit(|x| self.l::<f64>(x))
-    }
-
     /// L(x) of eq. 3.
     #[inline(always)]
     fn l<L: Real + Lift<S>>(&self, x: L) -> L {
@@ -95,17 +113,33 @@ impl<S: Real> FittedLambda<S> {
     /// ln Λ(μ), eq. 3.
     #[inline(always)]
     pub fn ln_lambda<L: Real + Lift<S>>(&self, cos: L) -> L {
-        self.ln_lambda_read(cos, &[])
-    }
-
-    /// [`ln_lambda`](Self::ln_lambda), L read from [`cubics`](Self::cubics) where there are any.
-    #[inline(always)]
-    pub(crate) fn ln_lambda_read<L: Real + Lift<S>>(&self, cos: L, cubics: &[S]) -> L {
         let low = cos.lt(L::c(0.5));
-        let x = L::select(low, cos, L::one() - cos);
-        let l = L::octaves(cubics, x).unwrap_or_else(|| self.l(x));
+        let l = self.l(L::select(low, cos, L::one() - cos));
         L::select(low, l, L::lift(self.twice_l_half) - l)
     }
+
+    /// Λ(μ), made softer at grazing angles by eq. 4: Λ^(1 + `soften`·(1 − μ)⁸), `soften` being 2, or 0 for none of it.
+    #[inline(always)]
+    pub fn lambda<L: Real + Lift<S>>(&self, cos: L, soften: S) -> L {
+        let grazing = (L::one() - cos).sq().sq().sq();
+        let softened = L::lift(soften).mul_add(grazing, L::one());
+        (self.ln_lambda(cos) * softened).exp()
+    }
+}
+
+impl FittedLambda<f64> {
+    /// [`lambda`](Self::lambda) as cubics, for [`read_lambda`].
+    pub(crate) fn cubics(&self, soften: f64) -> Vec<f64> {
+        let low = octaves::fit::<32, 3>(|x| self.lambda(x, soften));
+        low.into_iter().chain(octaves::fit::<32, 3>(|x| self.lambda(1.0 - x, soften))).collect()
+    }
+}
+
+/// Λ(μ) from [`FittedLambda::cubics`]: a power, an exponential and a division less. `None` if there are none. It changes
+/// as powers do toward both ends.
+#[inline(always)]
+pub(crate) fn read_lambda<S, L: Real + Lift<S>>(cubics: &[S], cos: L) -> Option<L> {
+    L::octaves::<32, 3, 512>(cubics, L::select(cos.lt(L::c(0.5)), cos, -(L::one() - cos)))
 }
 
 /// The lowest roughness the series of the exact Λ covers.

@@ -251,13 +251,17 @@ pub(crate) fn each_lane(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> f32) -> F32x8 {
     F32x8(out)
 }
 
-/// One number of every lane, from it and a number that goes with it.
+/// One number of every lane, from it and numbers that go with it.
 #[inline(always)]
-pub(crate) fn each_lane_with(wi: &V3<F32x8>, with: F32x8, f: impl Fn(V3<f32>, f32) -> f32) -> F32x8 {
+pub(crate) fn each_lane_of<const N: usize>(
+    wi: &V3<F32x8>,
+    with: [F32x8; N],
+    f: impl Fn(V3<f32>, [f32; N]) -> f32,
+) -> F32x8 {
     let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
-    let (F32x8(with), mut out) = (with, [0.0; F32x8::LANES]);
+    let mut out = [0.0; F32x8::LANES];
     for i in 0..F32x8::LANES {
-        out[i] = f(V3::new(x[i], y[i], z[i]), with[i]);
+        out[i] = f(V3::new(x[i], y[i], z[i]), with.map(|w| w.0[i]));
     }
     F32x8(out)
 }

@@ -29,9 +29,10 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb, each_lane, each_lane_with};
+use super::{Lobe, LobeKind, Rgb, each_lane, each_lane_of};
+use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{F32x8, Lift, Real, V3, octaves};
+use crate::optics::{F32x8, Lift, Real, V3};
 
 closure! {
     /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
@@ -194,10 +195,18 @@ struct FittedFor<S> {
 }
 
 impl<S: Real> FittedFor<S> {
-    /// ln Λ before it is softened.
+    /// Λ toward the viewer, which is never softened.
     #[inline(always)]
-    fn ln_lambda<L: Real + Lift<S>>(&self, w: V3<L>, known: &[S]) -> L {
-        self.fit.ln_lambda_read(w.z.clamp(L::c(MIN_COS), L::one()), split(known).cubics)
+    fn lambda_o(&self, wo: V3<S>, known: Known<'_, S>) -> S {
+        let cos = fitted_cosine(wo);
+        charlie::read_lambda(known.lambda_o, cos).unwrap_or_else(|| self.fit.lambda(cos, S::zero()))
+    }
+
+    /// Λ toward a light.
+    #[inline(always)]
+    fn lambda_i<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+        let cos = fitted_cosine(wi);
+        charlie::read_lambda(known.lambda_i, cos).unwrap_or_else(|| self.fit.lambda(cos, self.soften))
     }
 }
 
@@ -232,8 +241,7 @@ pub struct Sheen<S> {
 }
 
 impl<S: Real> Sheen<S> {
-    /// `known`: what [`extra`](Self::extra) gave.
-    fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: &[S]) -> Self {
+    fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: Known<'_, S>) -> Self {
         let r = roughness.clamp(S::c(variant.floor()), S::one());
         let fitted = |fit: FittedLambda<S>, soften: f64| {
             let (lambda_o, scale) = (S::one(), S::one());
@@ -248,7 +256,7 @@ impl<S: Real> Sheen<S> {
             CharlieV => Shadowing::Visibility,
             Zeltner => Shadowing::Transformed { albedo: S::zero() },
         };
-        let params = match split(known).row {
+        let params = match known.row {
             [] => ltc::read(variant.table(), wo.z, r),
             row => ltc::read_row(row, wo.z),
         };
@@ -258,17 +266,16 @@ impl<S: Real> Sheen<S> {
 
     /// Turned toward ωo, where its transformed cosine has the parameters `params`.
     #[inline(always)]
-    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: &[S]) -> Self {
+    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S>) -> Self {
         let [a, b, c, share] = params;
         let mut uniform = share;
         let shadowing = match self.shadowing {
             Shadowing::Fitted(fitted) => {
-                let cos = wo.z.clamp(S::c(MIN_COS), S::one());
-                let lambda_o = S::one() + fitted.ln_lambda(wo, known).exp();
-                Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / cos, ..fitted })
+                let lambda_o = S::one() + fitted.lambda_o(wo, known);
+                Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / fitted_cosine(wo), ..fitted })
             }
             Shadowing::Exact { exact, .. } => {
-                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), split(known).terms);
+                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), known.terms);
                 Shadowing::Exact { exact, cos_lambda_o }
             }
             Shadowing::Visibility => Shadowing::Visibility,
@@ -282,28 +289,31 @@ impl<S: Real> Sheen<S> {
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, known: &[S]) -> L {
+    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
         match self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, fitted.ln_lambda(wi, known)),
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, self.d(wi, known), fitted.lambda_i(wi, known)),
             _ => self.value_apart(wi, known),
         }
     }
 
     /// Apart, so that the default model stays short.
     #[inline(never)]
-    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, known: &[S]) -> L {
+    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+        let d = self.d(wi, known);
         match self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, fitted.ln_lambda(wi, known)),
-            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, split(known).terms),
-            Shadowing::Visibility => self.visible(wi),
+            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, d, fitted.lambda_i(wi, known)),
+            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, d, known.terms),
+            Shadowing::Visibility => self.visible(wi, d),
             Shadowing::Transformed { albedo } => self.transformed(albedo, wi),
         }
     }
 
     /// D over ωo and ωi.
     #[inline(always)]
-    fn d<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        self.fibres.d(charlie::half_cot2(V3::<L>::lift(self.wo), wi))
+    fn d<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+        let wo = V3::<L>::lift(self.wo);
+        charlie::read_d(known.powers, charlie::half_sin2(wo, wi))
+            .unwrap_or_else(|| self.fibres.d(charlie::half_cot2(wo, wi)))
     }
 
     /// `f` where both directions lie above the surface, else 0.
@@ -313,28 +323,23 @@ impl<S: Real> Sheen<S> {
     }
 
     #[inline(always)]
-    fn fitted<L: Real + Lift<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, ln_lambda: L) -> L {
-        let FittedFor { lambda_o, scale, soften, .. } = fitted;
-        let cos = wi.z.clamp(L::c(MIN_COS), L::one());
-        // Eq. 4: Λ(ωi)^(1 + 2(1 − μi)⁸).
-        let grazing = (L::one() - cos).sq().sq().sq();
-        let softened = L::lift(soften).mul_add(grazing, L::one());
-        let lambda_i = (ln_lambda * softened).exp();
-        self.above(wi, self.d(wi) * L::lift(scale) / (cos * (L::lift(lambda_o) + lambda_i)))
+    fn fitted<L: Real + Lift<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
+        let FittedFor { lambda_o, scale, .. } = fitted;
+        self.above(wi, d * L::lift(scale) / (fitted_cosine(wi) * (L::lift(lambda_o) + lambda_i)))
     }
 
     #[inline(always)]
-    fn exact<L: Real + Lift<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, terms: &[S]) -> L {
+    fn exact<L: Real + Lift<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, d: L, terms: &[S]) -> L {
         // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
         let cos_o = L::lift(self.wo.z);
         let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
         let sum = cos_o * (wi.z + cos_lambda_i) + wi.z * L::lift(cos_lambda_o);
-        self.above(wi, self.d(wi) * L::c(0.25) / sum.max(L::c(1e-30)))
+        self.above(wi, d * L::c(0.25) / sum.max(L::c(1e-30)))
     }
 
     #[inline(always)]
-    fn visible<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        self.above(wi, self.d(wi) * visibility(L::lift(self.wo.z), wi.z))
+    fn visible<L: Real + Lift<S>>(&self, wi: V3<L>, d: L) -> L {
+        self.above(wi, d * visibility(L::lift(self.wo.z), wi.z))
     }
 
     #[inline(always)]
@@ -357,65 +362,72 @@ impl<S: Real> Sheen<S> {
     fn kernel(key: &[f64; 4], wo: V3<f64>, wi: &[V3<f64>], out: &mut [f64]) {
         out.fill(0.0);
         let terms = charlie::terms_at(key[0].clamp(charlie::MIN_ROUGHNESS, 1.0));
+        let known = Known { terms: &terms, ..NOTHING };
         for variant in Variant::ALL {
             if key[1] as u32 & 1 << variant as u32 != 0 {
-                let lobe = Sheen::<f64>::prepare(variant, key[0], wo, &terms);
+                let lobe = Sheen::<f64>::prepare(variant, key[0], wo, known);
                 for (out, wi) in out.iter_mut().zip(wi) {
-                    *out = out.max(lobe.value(*wi, &terms));
+                    *out = out.max(lobe.value(*wi, known));
                 }
             }
         }
     }
 
-    /// For [`CurveSpec::extra`]: the coefficients of the exact Λ, where it may be asked for; then, of a lobe that is all
-    /// known, its row of the transformed cosines and the cubics of its fitted Λ. [`split`] takes them apart.
-    fn extra(key: &[f64; 4], axis: Option<Axis>) -> Vec<f64> {
+    /// For [`CurveSpec::extra`]: the parts of [`Known`].
+    fn extra(key: &[f64; 4], axis: Option<Axis>) -> Extra<f64> {
         let mask = key[1] as u32;
-        let mut known = match axis {
+        let terms = match axis {
             _ if mask & 1 << Exact as u32 == 0 => vec![],
             Some(_) => charlie::term_rows(),
             None => charlie::terms_at(key[0]).to_vec(),
         };
-        if axis.is_none() && mask.is_power_of_two() {
-            let variant = Variant::ALL[mask.trailing_zeros() as usize];
-            known.extend(ltc::row(variant.table(), key[0]));
-            match variant {
-                Softened | Fitted => known.extend(FittedLambda::published(key[0]).cubics()),
-                RefitSoftened | Refit => known.extend(FittedLambda::refitted(key[0]).cubics()),
-                Exact | CharlieV | Zeltner => {}
-            }
+        if axis.is_some() || !mask.is_power_of_two() {
+            return [terms, vec![], vec![], vec![], vec![]];
         }
-        known
+        let variant = Variant::ALL[mask.trailing_zeros() as usize];
+        let lobe = Sheen::<f64>::prepare(variant, key[0], V3::new(0.0, 0.0, 1.0), Known { terms: &terms, ..NOTHING });
+        let [lambda_o, lambda_i] = match lobe.shadowing {
+            Shadowing::Fitted(FittedFor { fit, soften, .. }) => [0.0, soften].map(|soften| fit.cubics(soften)),
+            _ => [vec![], vec![]],
+        };
+        let powers = if variant == Zeltner { vec![] } else { lobe.fibres.cubics() };
+        [terms, ltc::row(variant.table(), key[0]), powers, lambda_o, lambda_i]
     }
 }
 
 /// What [`Sheen::extra`] gave; each may be empty.
+#[derive(Clone, Copy)]
 struct Known<'a, S> {
+    /// The coefficients of the exact Λ, where it may be asked for.
     terms: &'a [S],
+    /// Of a lobe that is all known: its row of the transformed cosines, …
     row: &'a [S],
-    cubics: &'a [S],
+    /// … the cubics of D, …
+    powers: &'a [S],
+    /// … and those of its fitted Λ, toward the viewer and toward a light.
+    lambda_o: &'a [S],
+    lambda_i: &'a [S],
 }
 
-#[inline(always)]
-fn split<S>(known: &[S]) -> Known<'_, S> {
-    let [terms, row] = match known.len() {
-        ROW | ROW_BEFORE_CUBICS => [0, ROW],
-        ROW_AFTER_TERMS => [charlie::COS_TERMS, ROW],
-        all => [all, 0],
-    };
-    let (terms, rest) = known.split_at(terms);
-    let (row, cubics) = rest.split_at(row);
-    Known { terms, row, cubics }
-}
+const NOTHING: Known<'static, f64> = Known { terms: &[], row: &[], powers: &[], lambda_o: &[], lambda_i: &[] };
 
-const ROW: usize = ltc::COS_NODES * ltc::PARAMS;
-const ROW_AFTER_TERMS: usize = charlie::COS_TERMS + ROW;
-const ROW_BEFORE_CUBICS: usize = ROW + 4 * octaves::CELLS;
+impl<'a, S: Real> Known<'a, S> {
+    #[inline(always)]
+    fn of(curve: &'a AlbedoCurve<S>) -> Self {
+        let [terms, row, powers, lambda_o, lambda_i] = curve.extra();
+        Known { terms, row, powers, lambda_o, lambda_i }
+    }
+}
 
 /// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
 #[inline(always)]
 pub(super) fn visibility<L: Real>(cos_o: L, cos_i: L) -> L {
     L::c(0.25) / (cos_o + cos_i - cos_o * cos_i).max(L::c(1e-30))
+}
+
+#[inline(always)]
+fn fitted_cosine<L: Real>(w: V3<L>) -> L {
+    w.z.clamp(L::c(MIN_COS), L::one())
 }
 
 #[inline(always)]
@@ -475,14 +487,14 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     fn new(params: &SheenParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
         let variant = Variant::of(params.mode, params.model, params.softening);
-        let lobe = Sheen::prepare(variant, S::from_f32(params.roughness), wo, curve.extra());
+        let lobe = Sheen::prepare(variant, S::from_f32(params.roughness), wo, Known::of(curve));
         Sheen { excess: curve.excess(wo, lobe.roughness), ..lobe }
     }
 
     #[inline(always)]
     fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
-        let (known, excess) = (curve.extra(), curve.excess(wo, self.roughness));
-        match split(known).row {
+        let (known, excess) = (Known::of(curve), curve.excess(wo, self.roughness));
+        match known.row {
             [] => None,
             row => Some(Sheen { excess, ..self.aimed(wo, ltc::read_row(row, wo.z), known) }),
         }
@@ -490,7 +502,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
-        self.kept(wi, curve, self.value(wi, curve.extra()))
+        self.kept(wi, curve, self.value(wi, Known::of(curve)))
     }
 
     #[inline(always)]
@@ -499,17 +511,18 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         f32: Lift<S>,
         F32x8: Lift<S>,
     {
+        // Apart, because it reads tables.
+        let known = Known::of(curve);
+        let d = self.d::<F32x8>(*wi, known);
         let value = match self.shadowing {
             Shadowing::Fitted(fitted) => {
-                // Apart, because it reads a table.
-                let ln_lambda = fitted.ln_lambda::<F32x8>(*wi, curve.extra());
-                each_lane_with(wi, ln_lambda, |w, ln_lambda| self.fitted(fitted, w, ln_lambda))
+                let lambda = fitted.lambda_i::<F32x8>(*wi, known);
+                each_lane_of(wi, [d, lambda], |w, [d, lambda]| self.fitted(fitted, w, d, lambda))
             }
             Shadowing::Exact { exact, cos_lambda_o } => {
-                let terms = split(curve.extra()).terms;
-                each_lane(wi, |w| self.exact(exact, cos_lambda_o, w, terms))
+                each_lane_of(wi, [d], |w, [d]| self.exact(exact, cos_lambda_o, w, d, known.terms))
             }
-            Shadowing::Visibility => each_lane(wi, |w| self.visible(w)),
+            Shadowing::Visibility => each_lane_of(wi, [d], |w, [d]| self.visible(w, d)),
             Shadowing::Transformed { albedo } => each_lane(wi, |w| self.transformed(albedo, w)),
         };
         self.kept(*wi, curve, value)

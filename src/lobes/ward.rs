@@ -178,7 +178,7 @@ impl<S: Real> Lobe<S> for Ward<S> {
             reciprocal: true,
             bounded: false,
             // Says that there is a table.
-            extra: |_, _| vec![1.0],
+            extra: |_, _| [vec![1.0], vec![], vec![], vec![], vec![]],
         })
     }
 
@@ -225,13 +225,13 @@ impl<S: Real> Lobe<S> for Ward<S> {
 
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
         let lit = S::select(w.z.gt(S::zero()), S::one(), S::zero());
-        [if curve.extra().is_empty() { lit } else { curve.view(w, self.place(w)) }; 3]
+        [if curve.extra()[0].is_empty() { lit } else { curve.view(w, self.place(w)) }; 3]
     }
 
     #[inline(always)]
     fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
         let lit = L::select(w.z.gt(L::zero()), L::one(), L::zero());
-        [if curve.extra().is_empty() { lit } else { curve.bound(w, self.place(w)).min(L::one()) }; 3]
+        [if curve.extra()[0].is_empty() { lit } else { curve.bound(w, self.place(w)).min(L::one()) }; 3]
     }
 }
 

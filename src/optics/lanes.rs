@@ -359,18 +359,15 @@ impl Lift<f32> for F32x8 {
     }
     /// In three loops, like [`quartic`](Self::quartic).
     #[inline(always)]
-    fn octaves(table: &[f32], x: Self) -> Option<Self> {
-        let cubics = table.as_chunks::<4>().0;
-        if cubics.len() != octaves::CELLS {
-            return None;
-        }
+    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[f32], x: Self) -> Option<Self> {
+        let cubics = octaves::cubics::<CELLS>(table)?;
         let (mut cell, mut t) = ([0; 8], [0.0; 8]);
         for k in 0..8 {
-            (cell[k], t[k]) = octaves::place(x.0[k]);
+            (cell[k], t[k]) = octaves::place::<OCTAVES, DIGITS>(x.0[k]);
         }
         let mut read = [[0.0; 4]; 8];
         for k in 0..8 {
-            read[k] = *cubics.get(cell[k] as usize).unwrap_or(&[0.0; 4]);
+            read[k] = cubics[cell[k] as usize & (CELLS - 1)];
         }
         let mut out = [0.0; 8];
         for k in 0..8 {
@@ -388,9 +385,13 @@ impl Lift<f32> for F32x8 {
             (first[k], part[k]) = (elementary::index(i) as u32, place - i);
         }
         let (mut a, mut b) = ([0.0; 8], [0.0; 8]);
-        for k in 0..8 {
-            if let Some([low, high]) = table.get(first[k] as usize..).and_then(|rest| rest.first_chunk()) {
-                (a[k], b[k]) = (*low, *high);
+        if let Some(pairs) = table.len().checked_sub(1) {
+            // Of one length, so that one look at it does for both.
+            let (low, high) = (&table[..pairs], &table[1..][..pairs]);
+            for k in 0..8 {
+                if let (Some(low), Some(high)) = (low.get(first[k] as usize), high.get(first[k] as usize)) {
+                    (a[k], b[k]) = (*low, *high);
+                }
             }
         }
         let mut out = [0.0; 8];
@@ -427,10 +428,9 @@ impl Lift<f32> for f32 {
         table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
     }
     #[inline(always)]
-    fn octaves(table: &[f32], x: f32) -> Option<f32> {
-        let (cell, t) = octaves::place(x);
-        let cubics = table.as_chunks().0;
-        (cubics.len() == octaves::CELLS).then(|| octaves::cubic(*cubics.get(cell as usize).unwrap_or(&[0.0; 4]), t))
+    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[f32], x: f32) -> Option<f32> {
+        let (cell, t) = octaves::place::<OCTAVES, DIGITS>(x);
+        Some(octaves::cubic(octaves::cubics::<CELLS>(table)?[cell as usize & (CELLS - 1)], t))
     }
 }
 

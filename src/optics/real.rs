@@ -142,9 +142,10 @@ pub trait Lift<S>: Sized {
         std::array::from_fn(|k| Self::gather(table, index + Self::c(k as f64)))
     }
 
-    /// Cubics over the eighths of octaves below 1: see [`octaves`](super::octaves). `None` if the type has more digits than they.
+    /// A table of cubics over parts of octaves below 1: see [`octaves`](super::octaves). `None` if it is none, or if the
+    /// type has more digits than they.
     #[inline(always)]
-    fn octaves(table: &[S], x: Self) -> Option<Self> {
+    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[S], x: Self) -> Option<Self> {
         let _ = (table, x);
         None
     }
