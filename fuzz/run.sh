@@ -8,7 +8,7 @@
 # CARGO_TARGET_DIR     where to build; else target/fuzz
 #
 # Needs a nightly compiler and `cargo install cargo-fuzz`. New inputs go to target/fuzz-corpus, and inputs that fail to
-# target/fuzz-artifacts; `cargo +nightly fuzz cmin` makes of the former what fuzz/corpus keeps.
+# target/fuzz-artifacts; `fuzz/keep.py` makes of the former what fuzz/corpus keeps.
 set -eu
 cd "$(dirname "$0")"
 seconds=${1:?seconds per target}

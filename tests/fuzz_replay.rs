@@ -1,5 +1,5 @@
-//! The fuzzers' targets on the scripts of the corpus and on inputs that a seed draws: what fuzzing does, in small.
-//! `fuzz/run.sh` looks further.
+//! The fuzzers' targets on the inputs that fuzzing kept, on the scripts of the corpus, and on inputs that a seed draws:
+//! what fuzzing does, in small. `fuzz/run.sh` looks further, `fuzz/keep.py` keeps what it finds.
 
 #[path = "../fuzz/src/lib.rs"]
 mod targets;
@@ -54,30 +54,35 @@ const SCRIPT: &str = "surface a(float r = 0.3) { Ci = sheen(diffuse(N), N, 1, r)
 
 #[test]
 fn scripts_parse_or_are_errors() {
+    assert!(replay(targets::parse, &["fuzz/corpus/parse"]) > 20);
     assert!(replay(targets::parse, &SCRIPTS) > 20);
     mutated(targets::parse, &[SCRIPT.into()], 200);
 }
 
 #[test]
 fn scripts_are_shaded_alone_as_side_by_side() {
+    assert!(replay(targets::front_end, &["fuzz/corpus/front_end"]) > 20);
     assert!(replay(targets::front_end, &SCRIPTS) > 20);
     mutated(targets::front_end, &[SCRIPT.into()], 200);
 }
 
 #[test]
 fn closure_trees_give_sane_numbers() {
+    assert!(replay(targets::trees, &["fuzz/corpus/trees"]) > 20);
     mutated(targets::trees, &[], 40);
 }
 
 #[cfg(feature = "capi")]
 #[test]
 fn calls_of_the_c_interface_are_answered() {
+    assert!(replay(targets::handles, &["fuzz/corpus/handles"]) > 20);
     mutated(targets::handles, &[], 100);
 }
 
 #[cfg(feature = "studio")]
 #[test]
 fn the_studio_answers_any_request() {
+    assert!(replay(targets::studio, &["fuzz/corpus/studio"]) > 20);
     let body = format!("{{\"text\": \"{SCRIPT}\", \"path\": \"a.osl\", \"size\": 16, \"spp\": 1}}");
     let seeds: Vec<Vec<u8>> = (0..24u8).map(|first| [&[first], body.as_bytes()].concat()).collect();
     mutated(targets::studio, &seeds, 100);
@@ -88,6 +93,7 @@ fn the_studio_answers_any_request() {
 #[test]
 fn pictures_light_or_are_errors() {
     use overcoat::preview::{Image, output};
+    assert!(replay(targets::light, &["fuzz/corpus/light"]) > 20);
     let image = Image::from_vec(4, 2, (0..24).map(|i| i as f32).collect()).expect("a picture");
     let exr = output::exr(&image).expect("written");
     let hdr = [&b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"[..], &[128; 32]].concat();

@@ -90,7 +90,9 @@ pub fn trees(bytes: &[u8]) {
     let wo = wo.map(f64::from);
     interrogate(&exact(wo), &directions.map(|w| w.map(f64::from)), &mut bytes);
     if measured == 1 && tier & 1 == 1 && budgeted && small {
-        let e = albedo(&exact, Side::View, wo, Tolerance { error: 1e-3, evaluations: 20_000 });
+        let measured = |evaluations| albedo(&exact, Side::View, wo, Tolerance { error: 1e-3, evaluations });
+        // What so few evaluations find may be a highlight they have half seen.
+        let e = Some(measured(20_000)).filter(|e| e.max() <= 1.001).unwrap_or_else(|| measured(1_000_000));
         assert!(e.max() - 2.0 * e.error <= 1.001, "gains: {} ± {}", e.max(), e.error);
     }
 }

@@ -13,10 +13,11 @@
 //! channel that loses least has it; others may lose 0.3 %.
 
 use super::interface::{Interface, index};
+use super::lanes::{each_lane, over_lanes};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
-use super::{Lobe, Rgb, Sides, each_lane, over_lanes};
+use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{F32x8, Lift, Real, V3};

@@ -18,8 +18,9 @@
 //!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
+use super::lanes::{each_lane, over_lanes_of};
 use super::rough::{Reflectance, chance, even, largest, split};
-use super::{Rgb, Sides, each_lane, over_lanes_with};
+use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
@@ -254,8 +255,8 @@ impl<S: Real> Interface<S> {
     {
         let missing = tables.missing(*wi, self.facets.alpha());
         match self.plain() {
-            Some(plain) => over_lanes_with(wi, missing, |w, missing| plain.value(w, missing)),
-            None => over_lanes_with(wi, missing, |w, missing| self.value(w, missing)),
+            Some(plain) => over_lanes_of(wi, [missing], |w, [missing]| plain.value(w, missing)),
+            None => over_lanes_of(wi, [missing], |w, [missing]| self.value(w, missing)),
         }
     }
 

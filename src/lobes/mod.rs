@@ -23,6 +23,7 @@ pub mod eon;
 pub mod fabric;
 pub mod host;
 mod interface;
+mod lanes;
 pub mod limits;
 mod ltc_tables;
 pub mod metal;
@@ -47,6 +48,7 @@ pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{F32x8, Lift, Real, V3};
+use lanes::{each_lane, over_lanes};
 use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
@@ -237,62 +239,6 @@ fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound
 fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
     let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
     Evaluated { f: lobe.f_lanes(wi, curve), pdf: lobe.pdf_lanes(wi), bound }
-}
-
-/// One number of every lane.
-#[inline(always)]
-pub(crate) fn each_lane(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> f32) -> F32x8 {
-    // What the loop reads and writes is local, so that nothing it writes can be something it reads.
-    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
-    let mut out = [0.0; F32x8::LANES];
-    for i in 0..F32x8::LANES {
-        out[i] = f(V3::new(x[i], y[i], z[i]));
-    }
-    F32x8(out)
-}
-
-/// One number of every lane, from it and numbers that go with it.
-#[inline(always)]
-pub(crate) fn each_lane_of<const N: usize>(
-    wi: &V3<F32x8>,
-    with: [F32x8; N],
-    f: impl Fn(V3<f32>, [f32; N]) -> f32,
-) -> F32x8 {
-    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
-    let mut out = [0.0; F32x8::LANES];
-    for i in 0..F32x8::LANES {
-        out[i] = f(V3::new(x[i], y[i], z[i]), with.map(|w| w.0[i]));
-    }
-    F32x8(out)
-}
-
-/// `f` of every lane and of a number that goes with it.
-#[inline(always)]
-pub(crate) fn over_lanes_with(wi: &V3<F32x8>, with: F32x8, f: impl Fn(V3<f32>, f32) -> Rgb<f32>) -> Rgb<F32x8> {
-    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
-    let (F32x8(with), mut out) = (with, [[0.0; F32x8::LANES]; 3]);
-    for i in 0..F32x8::LANES {
-        let value = f(V3::new(x[i], y[i], z[i]), with[i]);
-        for c in 0..3 {
-            out[c][i] = value[c];
-        }
-    }
-    out.map(F32x8)
-}
-
-/// `f` of every lane.
-#[inline(always)]
-pub(crate) fn over_lanes(wi: &V3<F32x8>, f: impl Fn(V3<f32>) -> Rgb<f32>) -> Rgb<F32x8> {
-    // What the loop reads and writes is local, so that nothing it writes can be something it reads.
-    let V3 { x: F32x8(x), y: F32x8(y), z: F32x8(z) } = *wi;
-    let mut out = [[0.0; F32x8::LANES]; 3];
-    for i in 0..F32x8::LANES {
-        let value = f(V3::new(x[i], y[i], z[i]));
-        for c in 0..3 {
-            out[c][i] = value[c];
-        }
-    }
-    out.map(F32x8)
 }
 
 macro_rules! lobes {

@@ -26,10 +26,11 @@
 //! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
+use super::lanes::{each_lane, each_lane_of};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb, each_lane, each_lane_of};
+use super::{Lobe, LobeKind, Rgb};
 use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::{F32x8, Lift, Real, V3};
