@@ -109,6 +109,8 @@ pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) layering: Layering,
     /// The most layers open at once.
     pub(super) depth: u16,
+    /// Whether [`FlatStack`] will do for its layers, as far as the tree goes.
+    pub(super) flat: bool,
     pub(crate) ops: SmallVec<[Op; 32]>,
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
     /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
@@ -128,6 +130,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             ng: zero,
             layering: Layering::default(),
             depth: 0,
+            flat: true,
             ops: SmallVec::new(),
             lobes: SmallVec::new(),
             balanced: SmallVec::new(),
@@ -141,6 +144,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Black again for another point, keeping what memory there is.
     pub(super) fn reset(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
         (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
+        self.flat = true;
         self.ops.clear();
         self.lobes.clear();
         self.balanced.clear();
@@ -318,10 +322,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         self.walk(w, true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
     }
 
-    /// Whether [`walk_flat`](Self::walk_flat) will do: no layers in layers, all channels dimmed alike, nothing solved for.
+    /// Whether [`walk_flat`](Self::walk_flat) will do: layers as scripts build them, all channels dimmed alike, nothing
+    /// solved for.
     #[inline(always)]
     pub(super) fn is_flat(&self) -> bool {
-        self.depth <= 1 && self.layering.tint == TintRule::Largest && self.balanced.is_empty()
+        self.flat && self.layering.tint == TintRule::Largest && self.balanced.is_empty()
     }
 
     /// Apart, because its stack is large.

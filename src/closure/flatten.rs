@@ -235,13 +235,65 @@ struct Flattener<'b, 'm, S: Scalar, const D: usize> {
     stack: LayerStack<S, D>,
     /// What lies above, for balancing.
     chain: Chain<S>,
-    /// What comes before the next lobe, as far as one layer goes, and α toward ωo of the last layer.
-    steps: u8,
-    alpha_o: S,
+    flat: Flat<S>,
     /// Lobes met so far, whether they count or not.
     met: usize,
     /// One per frame.
     standing: SmallVec<[Standing<S>; 8]>,
+}
+
+/// What a [`FlatStack`](super::layer::FlatStack) is to do before each lobe, and whether it will do.
+struct Flat<S> {
+    /// Before the next lobe, and before the top began that is being met.
+    steps: u8,
+    steps_before: u8,
+    /// α toward ωo of the layer whose base begins there.
+    alpha_o: S,
+    /// Lobes there were when the top began.
+    lobes_before: usize,
+    /// Layers that are open, and those of them whose base is still to come.
+    open: u16,
+    tops: u16,
+    /// Something has ended in the innermost open layer, which must end as well.
+    ended: bool,
+}
+
+impl<S: Scalar> Flat<S> {
+    fn new() -> Self {
+        let alpha_o = S::one();
+        Flat { steps: step::NONE, steps_before: step::NONE, alpha_o, lobes_before: 0, open: 0, tops: 0, ended: false }
+    }
+
+    fn begin(&mut self, bsdf: &mut Bsdf<'_, S>) {
+        bsdf.flat &= self.tops == 0 && !self.ended;
+        (self.steps_before, self.lobes_before) = (self.steps, bsdf.lobes.len());
+        self.steps |= step::BEGIN;
+        self.open += 1;
+        self.tops += 1;
+    }
+
+    fn middle(&mut self, bsdf: &Bsdf<'_, S>, alpha_o: S) {
+        self.tops -= 1;
+        if bsdf.lobes.len() == self.lobes_before {
+            // A top that came to nothing passes everything.
+            self.steps = self.steps_before;
+        } else {
+            (self.steps, self.alpha_o) = (step::MIDDLE, alpha_o);
+        }
+    }
+
+    fn end(&mut self) {
+        self.open -= 1;
+        self.ended = self.open > 0;
+        if self.open == 0 {
+            self.steps = step::CLEAR;
+        }
+    }
+
+    fn lobe(&mut self, bsdf: &mut Bsdf<'_, S>) {
+        bsdf.flat &= !self.ended;
+        self.steps = step::NONE;
+    }
 }
 
 /// How ωo stands in a frame.
@@ -259,18 +311,7 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
         let balance = tables.balance.filter(|_| bsdf.layering.rule == LayeringRule::Balanced);
         let (stack, chain) = (LayerStack::default(), Chain::default());
         let standing = SmallVec::new();
-        Flattener {
-            globals,
-            curves: tables.curves,
-            balance,
-            bsdf,
-            stack,
-            chain,
-            steps: step::NONE,
-            alpha_o: S::one(),
-            met: 0,
-            standing,
-        }
+        Flattener { globals, curves: tables.curves, balance, bsdf, stack, chain, flat: Flat::new(), met: 0, standing }
     }
 
     fn chained(&mut self, f: impl FnOnce(&mut Chain<S>)) {
@@ -317,7 +358,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn begin(&mut self) {
         self.stack.begin();
         self.chained(Chain::begin);
-        self.steps = step::BEGIN | step::CLEAR;
+        self.flat.begin(self.bsdf);
         self.bsdf.ops.push(Op::Begin);
     }
 
@@ -326,9 +367,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         let weight = first(w.in_top);
         let alpha = self.stack.middle(weight, rule, tint, None::<Rgb<S>>);
         self.chained(Chain::middle);
-        // Where the top came to nothing, what bounded the one before must go.
-        self.steps = step::MIDDLE | (self.steps & step::BEGIN);
-        self.alpha_o = alpha[0];
+        self.flat.middle(self.bsdf, alpha[0]);
         self.bsdf.layers.push(LayerAlpha { alpha_o: alpha, weight });
         self.bsdf.ops.push(Op::Middle);
     }
@@ -336,7 +375,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     fn end(&mut self) {
         self.stack.end();
         self.chained(Chain::end);
-        self.steps = step::CLEAR;
+        self.flat.end();
         self.bsdf.ops.push(Op::End);
     }
 
@@ -367,8 +406,8 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             site,
             frame,
             weight_in_top: w.in_top,
-            alpha_o: self.alpha_o,
-            steps: self.steps,
+            alpha_o: self.flat.alpha_o,
+            steps: self.flat.steps,
             in_top: w.inside && !view,
             delta: class == LobeClass::Delta,
             albedo: [S::zero(); 3],
@@ -397,7 +436,110 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         if self.balance.is_some() {
             self.bsdf.balanced.push(balanced);
         }
-        self.steps = step::NONE;
+        self.flat.lobe(self.bsdf);
         self.bsdf.ops.push(Op::Lobe);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lobes::Rgb32;
+
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
+
+    /// Trees by shape: how their layers stand, and whether they count as flat.
+    fn shapes() -> Vec<(&'static str, ClosureTree, bool)> {
+        let sheen = |t: &mut ClosureTree, weight: Rgb32| {
+            let lobe = t.lobe(LobeKind::Sheen, 0, &[0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.4, 0.0, 0.0, 1.0]);
+            t.mul(weight, lobe)
+        };
+        let build = |f: &dyn Fn(&mut ClosureTree) -> super::super::tree::NodeId| {
+            let mut tree = ClosureTree::new();
+            let root = f(&mut tree);
+            tree.set_root(root);
+            tree
+        };
+        let tint = [0.3, 0.8, 0.5];
+        vec![
+            (
+                "a layer in a base",
+                build(&|t| {
+                    let base = t.lobe(LobeKind::Diffuse, 1, &UP);
+                    let [inner, outer] = [sheen(t, tint), sheen(t, [0.9; 3])];
+                    let base = t.layer(inner, base);
+                    t.layer(outer, base)
+                }),
+                true,
+            ),
+            (
+                "a sum below two layers, and something beside them",
+                build(&|t| {
+                    let [a, b, c] = [1, 2, 3].map(|site| t.lobe(LobeKind::Diffuse, site, &UP));
+                    let [inner, outer, other] = [sheen(t, tint), sheen(t, [0.9; 3]), sheen(t, [0.4; 3])];
+                    let (a, b) = (t.mul([0.3; 3], a), t.mul([0.2, 0.1, 0.4], b));
+                    let base = t.add(a, b);
+                    let base = t.layer(inner, base);
+                    let layered = t.layer(outer, base);
+                    let beside = t.layer(other, c);
+                    let (layered, beside) = (t.mul([0.5; 3], layered), t.mul([0.5; 3], beside));
+                    t.add(layered, beside)
+                }),
+                true,
+            ),
+            (
+                "a top that gives off light alone",
+                build(&|t| {
+                    let (base, light) = (t.lobe(LobeKind::Diffuse, 1, &UP), t.lobe(LobeKind::Emission, 2, &[]));
+                    let [inner, outer] = [sheen(t, tint), sheen(t, [0.9; 3])];
+                    let base = t.layer(inner, base);
+                    let base = t.layer(light, base);
+                    t.layer(outer, base)
+                }),
+                true,
+            ),
+            (
+                "a layer in a top",
+                build(&|t| {
+                    let [a, b] = [1, 2].map(|site| t.lobe(LobeKind::Diffuse, site, &UP));
+                    let coat = sheen(t, tint);
+                    let a = t.mul([0.5; 3], a);
+                    let top = t.layer(coat, a);
+                    t.layer(top, b)
+                }),
+                false,
+            ),
+            (
+                "something beside a layer in a base",
+                build(&|t| {
+                    let [a, b] = [1, 2].map(|site| t.lobe(LobeKind::Diffuse, site, &UP));
+                    let [inner, outer] = [sheen(t, tint), sheen(t, [0.9; 3])];
+                    let layered = t.layer(inner, a);
+                    let (layered, b) = (t.mul([0.5; 3], layered), t.mul([0.5; 3], b));
+                    let base = t.add(layered, b);
+                    t.layer(outer, base)
+                }),
+                false,
+            ),
+        ]
+    }
+
+    #[test]
+    fn flat_trees_give_what_the_full_walk_gives() {
+        for (shape, tree, flat) in shapes() {
+            let curves = Curves::for_tree(&tree, Precision::FAST);
+            for rule in [LayeringRule::Min, LayeringRule::View] {
+                let layering = Layering { rule, ..Layering::default() };
+                for wo in [V3::polar(0.7f32, 0.4), V3::polar(0.05, 2.0), V3::polar(-0.3, 1.0)] {
+                    let mut bsdf = flatten(&tree, &Globals::default(), wo, layering, &curves).expect("small");
+                    assert_eq!(bsdf.is_flat(), flat, "{shape}");
+                    let directions = [0.9f32, 0.5, 0.1, 0.01, -0.5].map(|cos| V3::polar(cos, 5.0 * cos));
+                    let evaluate = |bsdf: &Bsdf<f32>| directions.map(|w| bsdf.eval([w.x, w.y, w.z]));
+                    let found = evaluate(&bsdf);
+                    bsdf.flat = false;
+                    assert_eq!(found, evaluate(&bsdf), "{shape}, {rule:?}, from {wo:?}");
+                }
+            }
+        }
     }
 }

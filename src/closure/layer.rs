@@ -64,22 +64,24 @@ pub fn scale<L: Real, const C: usize>(rule: LayeringRule, alpha_o: [L; C], alpha
     }
 }
 
-/// What stands before a lobe in a tree without layers in layers: bits of [`FlatStack`]'s steps.
+/// What stands before a lobe of a [`FlatStack`], in the order in which it happens.
 pub(crate) mod step {
     /// Nothing new.
     pub const NONE: u8 = 0;
-    /// A top begins.
-    pub const BEGIN: u8 = 1;
+    /// No layer dims what follows.
+    pub const CLEAR: u8 = 1;
     /// A base begins.
     pub const MIDDLE: u8 = 2;
-    /// No layer dims what follows.
-    pub const CLEAR: u8 = 4;
+    /// A top begins.
+    pub const BEGIN: u8 = 4;
 }
 
-/// [`LayerStack`] for trees without layers in layers, all channels dimmed alike: the same numbers for less.
+/// [`LayerStack`] for trees whose tops hold no layers and whose bases hold one at their end, as scripts build them
+/// (`Ci = sheen(Ci, …)`), all channels dimmed alike: the same numbers for less.
 pub(crate) struct FlatStack<L> {
     /// Bound on the albedo of the top being walked, so far; the fourth is idle, but four go as one.
     bound: [L; 4],
+    /// The product of all layer scales above here.
     scale: L,
 }
 
@@ -96,16 +98,17 @@ impl<L: Real> FlatStack<L> {
     #[inline(always)]
     pub fn step(&mut self, steps: u8, rule: LayeringRule, alpha_o: L) -> L {
         if steps != step::NONE {
-            if steps & step::BEGIN != 0 {
-                self.bound = [L::zero(); 4];
+            if steps & step::CLEAR != 0 {
+                self.scale = L::one();
             }
             if steps & step::MIDDLE != 0 {
                 let [r, g, b, _] = self.bound;
                 let alpha_i: [L; 1] = alpha(TintRule::Largest, [r, g, b]);
-                [self.scale] = scale(rule, [alpha_o], alpha_i);
+                let [s] = scale(rule, [alpha_o], alpha_i);
+                self.scale = self.scale * s;
             }
-            if steps & step::CLEAR != 0 {
-                self.scale = L::one();
+            if steps & step::BEGIN != 0 {
+                self.bound = [L::zero(); 4];
             }
         }
         self.scale
