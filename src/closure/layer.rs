@@ -105,7 +105,7 @@ impl<L: Real> FlatStack<L> {
                 let [r, g, b, _] = self.bound;
                 let alpha_i: [L; 1] = alpha(TintRule::Largest, [r, g, b]);
                 let [s] = scale(rule, [alpha_o], alpha_i);
-                self.scale = self.scale * s;
+                self.scale *= s;
             }
             if steps & step::BEGIN != 0 {
                 self.bound = [L::zero(); 4];
