@@ -129,18 +129,39 @@ impl<S: Real> FittedLambda<S> {
 }
 
 impl FittedLambda<f64> {
-    /// [`lambda`](Self::lambda) as cubics, for [`read_lambda`].
-    pub(crate) fn cubics(&self, soften: f64) -> Vec<f64> {
-        let low = octaves::fit::<32, 3>(|x| self.lambda(x, soften));
-        low.into_iter().chain(octaves::fit::<32, 3>(|x| self.lambda(1.0 - x, soften))).collect()
+    /// Λ as it is, for [`read_lambda`], within 2e-6.
+    pub(crate) fn cubics(&self) -> Vec<f64> {
+        from_both_ends::<3>(|cos| self.lambda(cos, 0.0))
+    }
+
+    /// [`lambda`](Self::lambda), softened or not, for [`read_softened`], within 5e-6.
+    pub(crate) fn softened_cubics(&self, soften: f64) -> Vec<f64> {
+        from_both_ends::<4>(|cos| self.lambda(cos, soften))
     }
 }
 
-/// Λ(μ) from [`FittedLambda::cubics`]: a power, an exponential and a division less. `None` if there are none. It changes
-/// as powers do toward both ends.
+/// Λ changes as powers do toward both ends.
+fn from_both_ends<const DIGITS: u32>(lambda: impl Fn(f64) -> f64) -> Vec<f64> {
+    let low = octaves::fit::<32, DIGITS>(&lambda);
+    low.into_iter().chain(octaves::fit::<32, DIGITS>(|x| lambda(1.0 - x))).collect()
+}
+
+/// Where [`from_both_ends`] has put a cosine.
+#[inline(always)]
+fn from_its_end<L: Real>(cos: L) -> L {
+    L::select(cos.lt(L::c(0.5)), cos, -(L::one() - cos))
+}
+
+/// Λ(μ) from [`FittedLambda::cubics`]: a power, an exponential and a division less. `None` if there are none.
 #[inline(always)]
 pub(crate) fn read_lambda<S, L: Real + Lift<S>>(cubics: &[S], cos: L) -> Option<L> {
-    L::octaves::<32, 3, 512>(cubics, L::select(cos.lt(L::c(0.5)), cos, -(L::one() - cos)))
+    L::octaves::<32, 3, 512>(cubics, from_its_end(cos))
+}
+
+/// Λ(μ) from [`FittedLambda::softened_cubics`], which are finer because it is steeper. `None` if there are none.
+#[inline(always)]
+pub(crate) fn read_softened<S, L: Real + Lift<S>>(cubics: &[S], cos: L) -> Option<L> {
+    L::octaves::<32, 4, 1024>(cubics, from_its_end(cos))
 }
 
 /// The lowest roughness the series of the exact Λ covers.
@@ -285,4 +306,38 @@ fn projected_area(cos: f64, r: f64, rule: &Rule) -> f64 {
         }
     }
     2.0 * sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_read_off_cubics_is_the_formula() {
+        let close = |read: f32, truth: f64, relative: f64, what: &str| {
+            assert!((f64::from(read) - truth).abs() <= relative * truth + 1e-6, "{what}: {read} for {truth}");
+        };
+        let single = |cubics: Vec<f64>| cubics.into_iter().map(|c| c as f32).collect::<Vec<_>>();
+        for r in [0.07, 0.2, 0.4, 1.0] {
+            let fibres = Fibres::new(r);
+            let powers = single(fibres.cubics());
+            for (fit, soften) in [(FittedLambda::published(r), 2.0), (FittedLambda::refitted(r), 0.0)] {
+                let [plain, softened] = [single(fit.cubics()), single(fit.softened_cubics(soften))];
+                let mut cos = 1.0f32;
+                while cos > 1e-4 {
+                    for cos in [cos, 1.0 - cos * cos] {
+                        let cos = cos.max(1e-4);
+                        let at = format!("Λ at {cos}, roughness {r}");
+                        close(read_lambda(&plain, cos).expect("cubics"), fit.lambda(cos.into(), 0.0), 2e-6, &at);
+                        let read = read_softened(&softened, cos).expect("cubics");
+                        close(read, fit.lambda(cos.into(), soften), 5e-6, &at);
+                    }
+                    let truth = fibres.d(1.0 / f64::from(cos) - 1.0);
+                    close(read_d(&powers, cos).expect("cubics"), truth, 6e-6, &format!("D at {cos}, roughness {r}"));
+                    cos *= 0.97;
+                }
+            }
+        }
+        assert!(Fibres::new(0.02).cubics().is_empty());
+    }
 }

@@ -207,7 +207,7 @@ impl<S: Real> FittedFor<S> {
     #[inline(always)]
     fn lambda_i<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
         let cos = fitted_cosine(wi);
-        charlie::read_lambda(known.lambda_i, cos).unwrap_or_else(|| self.fit.lambda(cos, self.soften))
+        charlie::read_softened(known.lambda_i, cos).unwrap_or_else(|| self.fit.lambda(cos, self.soften))
     }
 }
 
@@ -388,7 +388,7 @@ impl<S: Real> Sheen<S> {
         let variant = Variant::ALL[mask.trailing_zeros() as usize];
         let lobe = Sheen::<f64>::prepare(variant, key[0], V3::new(0.0, 0.0, 1.0), Known { terms: &terms, ..NOTHING });
         let [lambda_o, lambda_i] = match lobe.shadowing {
-            Shadowing::Fitted(FittedFor { fit, soften, .. }) => [0.0, soften].map(|soften| fit.cubics(soften)),
+            Shadowing::Fitted(FittedFor { fit, soften, .. }) => [fit.cubics(), fit.softened_cubics(soften)],
             _ => [vec![], vec![]],
         };
         let powers = if variant == Zeltner { vec![] } else { lobe.fibres.cubics() };

@@ -12,18 +12,22 @@ const fn lowest(octaves: u32) -> u32 {
     (127 - octaves) << 23
 }
 
+/// The highest number below 1.
+const HIGHEST: f32 = 1.0f32.next_down();
+
 /// The cubics in `table`; `None` if it is no table of this kind.
 #[inline(always)]
 pub fn cubics<const CELLS: usize>(table: &[f32]) -> Option<&[[f32; 4]; CELLS]> {
     table.as_chunks().0.try_into().ok()
 }
 
-/// The cell of `x`, |x| < 1, and where it lies in it, in [−1, 1].
+/// The cell of `x`, |x| ≤ 1, and where it lies in it, in [−1, 1].
 #[inline(always)]
 pub fn place<const OCTAVES: u32, const DIGITS: u32>(x: f32) -> (u32, f32) {
     let low = f32::from_bits(lowest(OCTAVES));
-    let size = x.abs();
-    let bits = if size > low { size } else { low }.to_bits();
+    let size = if x.abs() > low { x.abs() } else { low };
+    // 1 itself is read at the end of the last cell.
+    let bits = if size < HIGHEST { size } else { HIGHEST }.to_bits();
     let half = (x.to_bits() >> 31) * (OCTAVES << DIGITS);
     let cell = ((bits - lowest(OCTAVES)) >> (23 - DIGITS)) + half;
     // The digits below the cell's, as a number in [1, 2).
@@ -76,7 +80,7 @@ mod tests {
             assert_eq!(read::<512>(&table, 0.5), 0.5f32.powf(p as f32));
             table.extend(fit::<32, 4>(|x| 3.0 - x).into_iter().map(|c| c as f32));
             let close = 2e-7 + (p / 32.0f64).powi(4) / 190.0;
-            let mut x = 0.999_999_9f32;
+            let mut x = 1.0f32;
             while x > 1e-7 {
                 let truth = f64::from(x).powf(p);
                 let ours = f64::from(read::<1024>(&table, x));
