@@ -499,6 +499,17 @@ mod tests {
                 true,
             ),
             (
+                "light above something, beside a layer",
+                build(&|t| {
+                    let [a, b] = [1, 2].map(|site| t.lobe(LobeKind::Diffuse, site, &UP));
+                    let (coat, light) = (sheen(t, tint), t.lobe(LobeKind::Emission, 3, &[]));
+                    let (a, b) = (t.mul([0.5; 3], a), t.mul([0.5; 3], b));
+                    let (layered, beside) = (t.layer(coat, a), t.layer(light, b));
+                    t.add(layered, beside)
+                }),
+                true,
+            ),
+            (
                 "a layer in a top",
                 build(&|t| {
                     let [a, b] = [1, 2].map(|site| t.lobe(LobeKind::Diffuse, site, &UP));
