@@ -142,8 +142,9 @@ pub trait Lift<S>: Sized {
         std::array::from_fn(|k| Self::gather(table, index + Self::c(k as f64)))
     }
 
-    /// A table of cubics over parts of octaves below 1: see [`octaves`](super::octaves). `None` if it is none, or if the
-    /// type has more digits than they.
+    /// A table of `CELLS` cubics, 2^`DIGITS` to each of `OCTAVES` octaves below 1, at `x`, |x| ≤ 1; those for negative
+    /// numbers come after those for positive ones. `None` if the table is none of this kind, or if the type has more digits
+    /// than cubics of single precision.
     #[inline(always)]
     fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[S], x: Self) -> Option<Self> {
         let _ = (table, x);
