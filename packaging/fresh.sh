@@ -28,7 +28,7 @@ while IFS= read -r command; do
     # A page that waits for a browser is only started.
     case $command in
     *" -- studio"*) command="timeout 20 $command --no-open || [ \$? = 124 ]" ;;
-    pip*) command="python3 -m venv \$HOME/python && . \$HOME/python/bin/activate && ${command//&& python /&& python3 }" ;;
+    pip*) command="python3 -m venv \$HOME/python && . \$HOME/python/bin/activate && $command" ;;
     esac
     printf '\n== %s\n' "$command"
     start=$SECONDS
