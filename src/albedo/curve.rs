@@ -7,7 +7,7 @@
 use super::facets::FacetTables;
 use super::fibre::FibreTables;
 use super::quadrature::Rule;
-use crate::optics::{Lift, Real, Scalar, V3};
+use crate::optics::{Lift, Over, Real, Scalar, V3, lifted};
 use std::f64::consts::PI;
 
 /// f(ωo, ωi) of an isotropic lobe for many ωi: `(key, ωo, ωi, out)`.
@@ -172,29 +172,29 @@ impl<S: Scalar> AlbedoCurve<S> {
     }
 }
 
-impl<S: Real> AlbedoCurve<S> {
+impl<S: Scalar> AlbedoCurve<S> {
     /// E_view for the direction `w`; `parameter` is the varying one and is ignored if none varies. 0 below the surface.
     #[inline(always)]
-    pub fn view<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+    pub fn view<L: Over<S>>(&self, w: V3<L>, parameter: L) -> L {
         self.read(&self.view, w.z, parameter)
     }
 
     /// At least max(E_view, E_light); 0 below the surface.
     #[inline(always)]
-    pub fn bound<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+    pub fn bound<L: Over<S>>(&self, w: V3<L>, parameter: L) -> L {
         self.read(&self.bound, w.z, parameter)
     }
 
     /// At least E_view; 0 below the surface.
     #[inline(always)]
-    pub fn view_bound<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+    pub fn view_bound<L: Over<S>>(&self, w: V3<L>, parameter: L) -> L {
         self.read(if self.view_bound.is_empty() { &self.bound } else { &self.view_bound }, w.z, parameter)
     }
 
     /// At least max(1, E_view, E_light) of the lobe before it is divided. A lobe that gains divides f by the larger of
     /// this at ωo and at ωi: symmetric, and E ≤ 1 from both sides. 1 for lobes that never gain.
     #[inline(always)]
-    pub fn excess<L: Real + Lift<S>>(&self, w: V3<L>, parameter: L) -> L {
+    pub fn excess<L: Over<S>>(&self, w: V3<L>, parameter: L) -> L {
         self.read(&self.excess, w.z, parameter).max(L::one())
     }
 
@@ -264,26 +264,22 @@ impl<S: Real> AlbedoCurve<S> {
     }
 
     #[inline(always)]
-    fn read<L: Real + Lift<S>>(&self, table: &[S], cos: L, parameter: L) -> L {
+    fn read<L: Over<S>>(&self, table: &[S], cos: L, parameter: L) -> L {
         if table.is_empty() {
             return L::zero();
         }
         if self.rows == 1 {
             return L::quartic(table, self.cells[0], cos);
         }
-        let [cells, row_cells] = self.cells.map(L::lift);
+        let [cells, row_cells] = lifted::<_, L, 2>(self.cells);
         let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * cells;
         let i = x.whole().min(cells - L::one());
         let t = x - i;
-        let row = |r: L| {
-            let at = r.mul_add(cells + L::one(), i);
-            let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
-            (b - a).mul_add(t, a)
-        };
         let y = (parameter.safe_sqrt() - L::lift(self.lo)) * L::lift(self.inv_range);
         let y = y.clamp(L::zero(), L::one()) * row_cells;
         let j = y.whole().min(row_cells - L::one());
-        let (a, b) = (row(j), row(j + L::one()));
+        let at = j.mul_add(cells + L::one(), i);
+        let (a, b) = (L::between(table, at, t), L::between(table, at + cells + L::one(), t));
         let value = (b - a).mul_add(y - j, a);
         L::select(cos.gt(L::zero()), value, L::zero())
     }

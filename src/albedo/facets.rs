@@ -12,7 +12,7 @@ use super::curve::Precision;
 use super::fill::{Estimate, fill};
 use super::quadrature::Rule;
 use super::visible::FacetQuadrature;
-use crate::optics::{Lift, Real, Scalar, V3};
+use crate::optics::{Lift, Over, Real, Scalar, V3, lifted};
 use std::f64::consts::FRAC_2_PI;
 
 /// What the rows of a table go over.
@@ -64,7 +64,7 @@ struct Place<L> {
     row: L,
 }
 
-impl<S: Real> FacetTables<S> {
+impl<S: Scalar> FacetTables<S> {
     /// Whether there is no table: nothing is known of what is missing, and M reads 0.
     pub fn is_empty(&self) -> bool {
         self.missing.is_empty()
@@ -78,14 +78,14 @@ impl<S: Real> FacetTables<S> {
     /// M(ω), in [0, 1]: 1 − E(ω) or a little less. 0 in the surface, and below one that does not transmit. `alpha` are
     /// the widths at this point.
     #[inline(always)]
-    pub fn missing<L: Real + Lift<S>>(&self, w: V3<L>, alpha: [S; 2]) -> L {
+    pub fn missing<A: Real<Entry = S>, L: Over<A>>(&self, w: V3<L>, alpha: [A; 2]) -> L {
         if self.is_empty() {
             return L::zero();
         }
         let missing = self.read(&self.missing, 0, self.place(w, alpha[0]));
         let missing = match self.kind {
             Rows::Alpha => {
-                let [x, y] = alpha.map(L::lift);
+                let [x, y] = lifted::<_, L, 2>(alpha);
                 L::select(x.lt(y) | y.lt(x), L::zero(), missing)
             }
             _ => missing,
@@ -94,27 +94,27 @@ impl<S: Real> FacetTables<S> {
     }
 
     /// Mean of M over the hemisphere above (or below), weighted with μ/π.
-    pub fn mean_missing(&self, below: bool, alpha: [S; 2]) -> S {
+    pub fn mean_missing<A: Real<Entry = S>>(&self, below: bool, alpha: [A; 2]) -> A {
         if self.is_empty() {
-            return S::zero();
+            return A::zero();
         }
         let sheet = if below { self.sheets - 1 } else { 0 };
-        let Rows::Alpha = self.kind else { return S::gather(&self.means, count::<S>(sheet)) };
-        let row = alpha_row(alpha[0]) * count::<S>(self.rows - 1);
-        let j = row.whole().min(count::<S>(self.rows - 2));
-        let at = count::<S>(sheet * self.rows) + j;
-        let (a, b) = (S::gather(&self.means, at), S::gather(&self.means, at + S::one()));
+        let Rows::Alpha = self.kind else { return A::gather(&self.means, count::<A>(sheet)) };
+        let row = alpha_row(alpha[0]) * count::<A>(self.rows - 1);
+        let j = row.whole().min(count::<A>(self.rows - 2));
+        let at = count::<A>(sheet * self.rows) + j;
+        let (a, b) = (A::gather(&self.means, at), A::gather(&self.means, at + A::one()));
         (b - a).mul_add(row - j, a)
     }
 
     /// Albedo of each part; 0 where `missing` is.
-    pub fn view<L: Real + Lift<S>>(&self, w: V3<L>) -> [L; PARTS] {
+    pub fn view<L: Over<S>>(&self, w: V3<L>) -> [L; PARTS] {
         self.parts_of(&self.view, w)
     }
 
     /// Never below the albedo of each part.
     #[inline(always)]
-    pub fn bound<L: Real + Lift<S>>(&self, w: V3<L>) -> [L; PARTS] {
+    pub fn bound<L: Over<S>>(&self, w: V3<L>) -> [L; PARTS] {
         self.parts_of(&self.bound, w)
     }
 
@@ -124,7 +124,7 @@ impl<S: Real> FacetTables<S> {
     }
 
     #[inline(always)]
-    fn parts_of<L: Real + Lift<S>>(&self, table: &[S], w: V3<L>) -> [L; PARTS] {
+    fn parts_of<L: Over<S>>(&self, table: &[S], w: V3<L>) -> [L; PARTS] {
         let mut result = [L::zero(); PARTS];
         if self.parts > 0 {
             // Parts are there only where the widths do not vary.
@@ -143,7 +143,7 @@ impl<S: Real> FacetTables<S> {
     }
 
     #[inline(always)]
-    fn place<L: Real + Lift<S>>(&self, w: V3<L>, width: S) -> Place<L> {
+    fn place<A: Real<Entry = S>, L: Over<A>>(&self, w: V3<L>, width: A) -> Place<L> {
         let last = |n: usize| count::<L>(n.max(2) - 2);
         let x = w.z.abs().min(L::one()).sqrt().sqrt() * count::<L>(self.nodes - 1);
         let i = x.whole().min(last(self.nodes));
@@ -163,17 +163,13 @@ impl<S: Real> FacetTables<S> {
     }
 
     #[inline(always)]
-    fn read<L: Real + Lift<S>>(&self, table: &[S], part: usize, place: Place<L>) -> L {
+    fn read<L: Over<S>>(&self, table: &[S], part: usize, place: Place<L>) -> L {
         let start = place.start + count::<L>(part * self.sheets * self.rows * self.nodes);
-        let line = |at: L| {
-            let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
-            (b - a).mul_add(place.across, a)
-        };
-        let low = line(start);
+        let low = L::between(table, start, place.across);
         if self.rows == 1 {
             return low;
         }
-        let high = line(start + count::<L>(self.nodes));
+        let high = L::between(table, start + count::<L>(self.nodes), place.across);
         (high - low).mul_add(place.row, low)
     }
 }

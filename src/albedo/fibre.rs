@@ -15,7 +15,7 @@ use super::facets::FacetSpec;
 use super::grid::{Grid, direction, first_place};
 use super::panels::Panels;
 use super::quadrature::Rule;
-use crate::optics::{Lift, Real, Scalar, V3};
+use crate::optics::{Over, Real, Scalar, V3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Most components of a lobe.
@@ -153,7 +153,7 @@ impl<S: Scalar> FibreTables<S> {
     }
 }
 
-impl<S: Real> FibreTables<S> {
+impl<S: Scalar> FibreTables<S> {
     /// Whether nothing was baked, because too many parameters vary.
     pub fn is_empty(&self) -> bool {
         self.view.is_empty()
@@ -166,13 +166,13 @@ impl<S: Real> FibreTables<S> {
 
     /// Albedo per component; `t` is the varying parameter in [0, 1], ignored if none varies. 0 below the surface.
     #[inline(always)]
-    pub fn view<L: Real + Lift<S>>(&self, w: V3<L>, t: L) -> [L; COMPONENTS] {
+    pub fn view<L: Over<S>>(&self, w: V3<L>, t: L) -> [L; COMPONENTS] {
         self.read(&self.view, w, t)
     }
 
     /// Never below the albedo per component; 0 below the surface.
     #[inline(always)]
-    pub fn bound<L: Real + Lift<S>>(&self, w: V3<L>, t: L) -> [L; COMPONENTS] {
+    pub fn bound<L: Over<S>>(&self, w: V3<L>, t: L) -> [L; COMPONENTS] {
         self.read(&self.bound, w, t)
     }
 
@@ -206,7 +206,7 @@ impl<S: Real> FibreTables<S> {
     }
 
     #[inline(always)]
-    fn read<L: Real + Lift<S>>(&self, table: &[S], w: V3<L>, t: L) -> [L; COMPONENTS] {
+    fn read<L: Over<S>>(&self, table: &[S], w: V3<L>, t: L) -> [L; COMPONENTS] {
         let mut result = [L::zero(); COMPONENTS];
         if table.is_empty() {
             return result;
@@ -215,11 +215,6 @@ impl<S: Real> FibreTables<S> {
         let up = w.z.gt(L::zero());
         let z = w.z.max(L::zero());
         let across = w.y.mul_add(w.y, z * z).sqrt();
-        let cell = |x: L, n: usize| {
-            let x = x.clamp(L::zero(), L::one()) * L::c((n - 1) as f64);
-            let i = x.floor().min(L::c((n.max(2) - 2) as f64));
-            (i, x - i)
-        };
         let inv = L::one() / (across + w.x.abs()).max(tiny);
         let place = if self.crossed {
             let half = L::c(0.5).sqrt();
@@ -242,17 +237,13 @@ impl<S: Real> FibreTables<S> {
             L::zero()
         };
         let start = sheet + j.mul_add(L::c(self.nodes as f64), i);
-        let line = |at: L| {
-            let (a, b) = (L::gather(table, at), L::gather(table, at + L::one()));
-            (b - a).mul_add(s, a)
-        };
         for (c, result) in result.iter_mut().enumerate().take(self.components) {
             let at = start + L::c((c * self.sheets * self.rows * self.nodes) as f64);
-            let low = line(at);
+            let low = L::between(table, at, s);
             let value = if self.rows == 1 {
                 low
             } else {
-                let high = line(at + L::c(self.nodes as f64));
+                let high = L::between(table, at + L::c(self.nodes as f64), s);
                 (high - low).mul_add(r, low)
             };
             *result = L::select(up, value, L::zero());
@@ -496,4 +487,11 @@ impl FibreQuadrature {
         }
         sums
     }
+}
+/// The cell of `x`, in [0, 1], over `n` nodes, and where it lies in it.
+#[inline(always)]
+fn cell<L: Real>(x: L, n: usize) -> (L, L) {
+    let x = x.clamp(L::zero(), L::one()) * L::c((n - 1) as f64);
+    let i = x.whole().min(L::c((n.max(2) - 2) as f64));
+    (i, x - i)
 }

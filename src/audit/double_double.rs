@@ -175,6 +175,7 @@ impl MulAssign for DoubleDouble {
 
 impl Real for DoubleDouble {
     type Mask = bool;
+    type Entry = Self;
 
     fn c(x: f64) -> Self {
         Self::of(x)
@@ -255,6 +256,9 @@ impl Real for DoubleDouble {
     fn select(mask: bool, a: Self, b: Self) -> Self {
         if mask { a } else { b }
     }
+    fn gather(table: &[DoubleDouble], index: Self) -> Self {
+        table[index.hi as usize]
+    }
     fn pick(table: &[f32], index: Self) -> Self {
         Self::from_f32(table[index.hi as usize])
     }
@@ -275,9 +279,6 @@ impl Scalar for DoubleDouble {
 impl Lift<DoubleDouble> for DoubleDouble {
     fn lift(s: DoubleDouble) -> Self {
         s
-    }
-    fn gather(table: &[DoubleDouble], index: Self) -> Self {
-        table[index.hi as usize]
     }
 }
 

@@ -10,7 +10,7 @@ use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{Frame, Lift, Real, Scalar, V3};
+use crate::optics::{Frame, Lift, Over, Real, Scalar, V3};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -337,7 +337,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// [`walk`](Self::walk) for most materials.
     #[inline(always)]
-    fn walk_flat<L: Real + Lift<S>>(&self, wi: V3<L>, mut visit: impl Visit<'m, S, L>) {
+    fn walk_flat<L: Over<S>>(&self, wi: V3<L>, mut visit: impl Visit<'m, S, L>) {
         let frames = &*self.frames;
         let mut stack = FlatStack::<L>::default();
         let (mut frame, mut local) = (u32::MAX, wi);
@@ -365,7 +365,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 
     #[inline(always)]
-    fn walk_within<L: Real + Lift<S>, const D: usize, const C: usize>(
+    fn walk_within<L: Over<S>, const D: usize, const C: usize>(
         &self,
         wi: V3<L>,
         bound: bool,
@@ -448,7 +448,7 @@ impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
 
 /// Adds f·|cos| per channel and the pdf of one lobe, scaled by what lies above it.
 #[inline(always)]
-pub(super) fn add<S: Scalar, L: Real + Lift<S>>(
+pub(super) fn add<S: Scalar, L: Over<S>>(
     sum: &mut [L; 4],
     l: &FlatLobe<'_, S>,
     scale: Rgb<L>,

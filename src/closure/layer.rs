@@ -10,7 +10,7 @@
 //! top and the scale of every lobe. A layer may stand in another's top or base, at any depth.
 
 use crate::lobes::Rgb;
-use crate::optics::{Lift, Real};
+use crate::optics::{Lift, Real, array};
 
 /// How a layer scales its base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -50,7 +50,7 @@ pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
             let larger = |a: L, b: L| L::select(a.gt(b), a, b);
             [pass(larger(larger(bound[0], bound[1]), bound[2])); C]
         }
-        TintRule::Channel => std::array::from_fn(|c| pass(bound[c])),
+        TintRule::Channel => array(|c| pass(bound[c])),
     }
 }
 
@@ -59,7 +59,7 @@ pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
 pub fn scale<L: Real, const C: usize>(rule: LayeringRule, alpha_o: [L; C], alpha_i: [L; C]) -> [L; C] {
     match rule {
         // What was solved for takes the place of this.
-        LayeringRule::Min | LayeringRule::Balanced => std::array::from_fn(|c| alpha_o[c].min(alpha_i[c])),
+        LayeringRule::Min | LayeringRule::Balanced => array(|c| alpha_o[c].min(alpha_i[c])),
         LayeringRule::View => alpha_o,
     }
 }
@@ -168,7 +168,7 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
     /// What the layers above scale a lobe here by.
     #[inline(always)]
     pub fn scale(&self) -> Rgb<L> {
-        std::array::from_fn(|c| self.scale[c % C])
+        array(|c| self.scale[c % C])
     }
 
     /// The bound on the whole tree's albedo, after the walk.
@@ -223,7 +223,7 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
         let alpha: [L; C] = alpha(tint, self.bound);
         // Seen from the light, `view` dims nothing: the bound there is Ē_t + Ē_b.
         let passed = if rule == LayeringRule::View && alpha_o.is_some() { [L::one(); C] } else { alpha };
-        let toward_viewer = alpha_o.map_or(alpha, |a| std::array::from_fn(|c| L::lift(a[c])));
+        let toward_viewer = alpha_o.map_or(alpha, |a| array(|c| L::lift(a[c])));
         let s = scale(rule, toward_viewer, alpha);
         let outer = *self.outer();
         for c in 0..3 {
@@ -234,7 +234,7 @@ impl<L: Real, const D: usize, const C: usize> LayerStack<L, D, C> {
             self.path[c] = outer.path[c] * passed[c];
             self.scale[c] = outer.scale[c] * s[c];
         }
-        std::array::from_fn(|c| alpha[c % C])
+        array(|c| alpha[c % C])
     }
 
     /// The layer is complete.

@@ -11,7 +11,7 @@ use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::curve::no_extra;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -56,7 +56,7 @@ impl<S: Real> Burley<S> {
 
     /// f(ωo, ωi) for ρ = 1, before it is bounded.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn value<L: Over<S>>(&self, wi: V3<L>) -> L {
         let wo = V3::<L>::lift(self.wo);
         let cos2 = (L::c(0.5) * (L::one() + wo.dot(wi))).clamp(L::zero(), L::one());
         let rise = L::c(2.0) * L::lift(self.roughness) * cos2 - L::c(0.5);
@@ -98,19 +98,19 @@ impl<S: Real> Lobe<S> for Burley<S> {
         params.albedo
     }
 
-    fn new(params: &BurleyParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &BurleyParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let lobe = Burley::prepare(S::from_f32(params.roughness), wo);
         Burley { excess: curve.excess(wo, lobe.roughness), ..lobe }
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
         [self.value(wi) / excess; 3]
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
 
@@ -118,12 +118,12 @@ impl<S: Real> Lobe<S> for Burley<S> {
         sampling::cosine_hemisphere(u)
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [curve.bound(w, L::lift(self.roughness)); 3]
     }
 }

@@ -9,7 +9,7 @@
 
 use super::charlie_terms::TERMS;
 use crate::albedo::quadrature::Rule;
-use crate::optics::{Lift, Real, V3, octaves};
+use crate::optics::{Lift, Over, Real, V3, octaves};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 /// The distribution D for one roughness.
@@ -31,7 +31,7 @@ impl<S: Real> Fibres<S> {
     /// D of eq. 2 from cot²θh. sin²θ is 1/(1 + cot²θ): its logarithm keeps full precision for fibres lying flat,
     /// where exponents of 500 would blow up the rounding of sin² itself.
     #[inline(always)]
-    pub fn d<L: Real + Lift<S>>(&self, cot2: L) -> L {
+    pub fn d<L: Over<S>>(&self, cot2: L) -> L {
         L::lift(self.norm) * (-L::lift(self.exponent) * cot2.ln_1p()).exp()
     }
 }
@@ -46,7 +46,7 @@ impl Fibres<f64> {
 
 /// D at sin²θh from [`Fibres::cubics`]: a logarithm and an exponential less. `None` if there are none.
 #[inline(always)]
-pub(crate) fn read_d<S, L: Real + Lift<S>>(cubics: &[S], sin2: L) -> Option<L> {
+pub(crate) fn read_d<L: Real>(cubics: &[L::Entry], sin2: L) -> Option<L> {
     L::octaves::<64, 4, 1024>(cubics, sin2)
 }
 
@@ -106,14 +106,14 @@ impl<S: Real> FittedLambda<S> {
 
     /// L(x) of eq. 3.
     #[inline(always)]
-    fn l<L: Real + Lift<S>>(&self, x: L) -> L {
+    fn l<L: Over<S>>(&self, x: L) -> L {
         let power = x.powf(L::lift(self.c));
         L::lift(self.a) / (L::one() + L::lift(self.b) * power) + L::lift(self.d).mul_add(x, L::lift(self.e))
     }
 
     /// ln Λ(μ), eq. 3.
     #[inline(always)]
-    pub fn ln_lambda<L: Real + Lift<S>>(&self, cos: L) -> L {
+    pub fn ln_lambda<L: Over<S>>(&self, cos: L) -> L {
         let low = cos.lt(L::c(0.5));
         let l = self.l(L::select(low, cos, L::one() - cos));
         L::select(low, l, L::lift(self.twice_l_half) - l)
@@ -121,7 +121,7 @@ impl<S: Real> FittedLambda<S> {
 
     /// Λ(μ), made softer at grazing angles by eq. 4: Λ^(1 + `soften`·(1 − μ)⁸), `soften` being 2, or 0 for none of it.
     #[inline(always)]
-    pub fn lambda<L: Real + Lift<S>>(&self, cos: L, soften: S) -> L {
+    pub fn lambda<L: Over<S>>(&self, cos: L, soften: S) -> L {
         let grazing = (L::one() - cos).sq().sq().sq();
         let softened = L::lift(soften).mul_add(grazing, L::one());
         (self.ln_lambda(cos) * softened).exp()
@@ -141,7 +141,7 @@ impl FittedLambda<f64> {
 }
 
 /// Λ changes as powers do toward both ends.
-fn from_both_ends<const DIGITS: u32>(lambda: impl Fn(f64) -> f64) -> Vec<f64> {
+fn from_both_ends<const DIGITS: i32>(lambda: impl Fn(f64) -> f64) -> Vec<f64> {
     let low = octaves::fit::<32, DIGITS>(&lambda);
     low.into_iter().chain(octaves::fit::<32, DIGITS>(|x| lambda(1.0 - x))).collect()
 }
@@ -154,13 +154,13 @@ fn from_its_end<L: Real>(cos: L) -> L {
 
 /// Λ(μ) from [`FittedLambda::cubics`]: a power, an exponential and a division less. `None` if there are none.
 #[inline(always)]
-pub(crate) fn read_lambda<S, L: Real + Lift<S>>(cubics: &[S], cos: L) -> Option<L> {
+pub(crate) fn read_lambda<L: Real>(cubics: &[L::Entry], cos: L) -> Option<L> {
     L::octaves::<32, 3, 512>(cubics, from_its_end(cos))
 }
 
 /// Λ(μ) from [`FittedLambda::softened_cubics`], which are finer because it is steeper. `None` if there are none.
 #[inline(always)]
-pub(crate) fn read_softened<S, L: Real + Lift<S>>(cubics: &[S], cos: L) -> Option<L> {
+pub(crate) fn read_softened<L: Real>(cubics: &[L::Entry], cos: L) -> Option<L> {
     L::octaves::<32, 4, 1024>(cubics, from_its_end(cos))
 }
 
@@ -237,7 +237,7 @@ impl<S: Real> ExactLambda<S> {
 
     /// μ·Λ(μ), which stays finite at the horizon, from μ and sin²θ.
     #[inline(always)]
-    pub fn cos_lambda<L: Real + Lift<S>>(&self, cos: L, sin2: L, terms: &[S]) -> L {
+    pub fn cos_lambda<L: Over<S>>(&self, cos: L, sin2: L, terms: &[S::Entry]) -> L {
         if terms.len() < COS_TERMS {
             return L::zero();
         }
@@ -255,7 +255,7 @@ impl<S: Real> ExactLambda<S> {
     }
 
     #[inline(always)]
-    fn term<L: Real + Lift<S>>(&self, terms: &[S], k: usize) -> L {
+    fn term<L: Over<S>>(&self, terms: &[S::Entry], k: usize) -> L {
         if terms.len() == COS_TERMS {
             return L::lift(terms[k]);
         }

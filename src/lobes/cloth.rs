@@ -21,7 +21,7 @@ use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
 use super::registry::ClosureParams;
 use super::{Lobe, Rgb, Rgb32};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, HORIZON, Ridges, TableSpec};
-use crate::optics::{F32x8, Lift, Real, V3, sampling};
+use crate::optics::{F32x8, Lift, Over, Real, V3, lifted, rgb, sampling};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
 
@@ -105,7 +105,7 @@ impl<S: Real> Proposal<S> {
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, theta: L) -> L {
+    fn pdf<L: Over<S>>(&self, theta: L) -> L {
         let mut sum = L::zero();
         for (k, part) in self.parts.iter().enumerate() {
             let center = self.step.mul_add(S::c(k as f64), self.first);
@@ -241,7 +241,7 @@ impl<S: Real> Family<S> {
 
     /// Σ a·z⁺.
     #[inline(always)]
-    fn seen<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
+    fn seen<L: Over<S>>(&self, w: V3<L>) -> L {
         let mut sum = L::zero();
         let (count, tangents) = self.tangents();
         for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
@@ -252,7 +252,7 @@ impl<S: Real> Family<S> {
 
     /// Σ a·z⁺, and Σ a·z⁺·R for the surface and the volume, R what a tangent reflects at most; see [`cloth_range`].
     #[inline(always)]
-    fn facing<L: Real + Lift<S>>(&self, w: V3<L>) -> [L; 3] {
+    fn facing<L: Over<S>>(&self, w: V3<L>) -> [L; 3] {
         let (head_on, kd) = (L::lift(self.head_on), L::lift(self.kd));
         let mut sums = [L::zero(); 3];
         let (count, tangents) = self.tangents();
@@ -270,7 +270,7 @@ impl<S: Real> Family<S> {
 
     /// Adds Σ a·S·M to the surface and volume sums, and Σ a·z⁺ of ωi to `q`.
     #[inline(always)]
-    fn add<L: Real + Lift<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
+    fn add<L: Over<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
         let (zero, kd) = (L::zero(), L::lift(self.kd));
         let (count, tangents) = self.tangents();
         for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
@@ -328,12 +328,23 @@ fn raised<R: Real>(w: V3<R>) -> V3<R> {
     V3::new(w.x, w.y, w.z.max(R::c(HORIZON)))
 }
 
+impl<S: Real> Family<S> {
+    /// Over solid angle, of sampling along the ridges, `w` in the family's frame.
+    #[inline(always)]
+    fn density<L: Over<S>>(&self, w: V3<L>) -> L {
+        let i = Around::new(w);
+        let beside = L::lift(self.beside);
+        let turn = (L::one() - beside.abs()).mul_add(L::c(0.5) * w.z, (beside * w.y).max(L::zero()));
+        self.ridges.pdf(i.angle()) * turn / i.cos.sq().max(L::c(1e-12))
+    }
+}
+
 impl<S: Real> Cloth<S> {
-    pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         Self::prepare(yarns, wo, curve, true)
     }
 
-    fn prepare(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S>, samples: bool) -> Self {
+    fn prepare(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S::Entry>, samples: bool) -> Self {
         let (above, wo) = (wo.z.gt(S::zero()), raised(wo));
         let total = (yarns[0].cover as f64 + yarns[1].cover as f64).max(1.0);
         let covered = (yarns[0].cover + yarns[1].cover).max(1e-6);
@@ -363,7 +374,7 @@ impl<S: Real> Cloth<S> {
 
     /// The surface sum, the volume sums and Q(ωi).
     #[inline(always)]
-    fn sums<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L, [L; 2], L) {
+    fn sums<L: Over<S>>(&self, wi: V3<L>) -> (L, [L; 2], L) {
         let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
         let mut q = L::lift(self.gap) * wi.z;
         let (mut surface, mut volume) = (L::zero(), [L::zero(); 2]);
@@ -373,14 +384,14 @@ impl<S: Real> Cloth<S> {
     }
 
     #[inline(always)]
-    fn parts<L: Real + Lift<S>>(&self, wi: V3<L>) -> [L; COMPONENTS] {
+    fn parts<L: Over<S>>(&self, wi: V3<L>) -> [L; COMPONENTS] {
         let (surface, volume, q) = self.sums(wi);
         let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale) / q, L::zero());
         [surface * scale, volume[0] * scale, volume[1] * scale]
     }
 
     /// What one family adds to [`parts`](Self::parts).
-    fn part<L: Real + Lift<S>>(&self, family: usize, wi: V3<L>) -> [L; COMPONENTS] {
+    fn part<L: Over<S>>(&self, family: usize, wi: V3<L>) -> [L; COMPONENTS] {
         let above = wi.z.gt(L::zero());
         let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
         let views = [(wo, wi), (across(wo), across(wi))];
@@ -395,14 +406,14 @@ impl<S: Real> Cloth<S> {
     }
 
     #[inline(always)]
-    fn mix<L: Real + Lift<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
+    fn mix<L: Over<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
         let warp = L::lift(self.families[0].color[channel]) * parts[WARP];
         L::lift(self.families[1].color[channel]).mul_add(parts[WEFT], parts[SURFACE] + warp)
     }
 
     /// Bounds on the components' albedos: from the table or, where there is none, as [`cloth_range`] derives.
     #[inline(always)]
-    fn bounds<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> [L; COMPONENTS] {
+    fn bounds<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> [L; COMPONENTS] {
         if !curve.fibre().is_empty() {
             return curve.fibre().bound(w, L::zero());
         }
@@ -414,9 +425,9 @@ impl<S: Real> Cloth<S> {
     }
 
     #[inline(always)]
-    pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    pub fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let (parts, e) = (self.parts(wi), self.bounds(wi, curve));
-        std::array::from_fn(|c| self.mix(parts, c) / self.mix(e, c).max(L::lift(self.excess[c])))
+        rgb!(c => self.mix(parts, c) / self.mix(e, c).max(L::lift(self.excess[c])))
     }
 
     /// Which part of the samples follows the families' ridges; the rest follows the cosine.
@@ -425,15 +436,10 @@ impl<S: Real> Cloth<S> {
         [self.families[0].share, self.families[1].share]
     }
 
-    pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
-        let density = |family: &Family<S>, w: V3<L>| {
-            let i = Around::new(w);
-            let beside = L::lift(family.beside);
-            let turn = (L::one() - beside.abs()).mul_add(L::c(0.5) * w.z, (beside * w.y).max(L::zero()));
-            family.ridges.pdf(i.angle()) * turn / i.cos.sq().max(L::c(1e-12))
-        };
-        let [a, b] = self.shares().map(L::lift);
-        let ridges = a * density(&self.families[0], wi) + b * density(&self.families[1], across(wi));
+    #[inline(always)]
+    pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
+        let [a, b] = lifted::<_, L, 2>(self.shares());
+        let ridges = a * self.families[0].density(wi) + b * self.families[1].density(across(wi));
         let even = (L::one() - a - b) * L::c(std::f64::consts::FRAC_1_PI);
         L::select(wi.z.gt(L::zero()), even.mul_add(wi.z, ridges), L::zero())
     }
@@ -452,16 +458,16 @@ impl<S: Real> Cloth<S> {
     }
 
     /// Where f is divided, an upper estimate: by the excess at `w` alone.
-    pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         let bound = self.bounds(w, curve);
         let e = if curve.fibre().is_empty() { bound } else { curve.fibre().view(w, S::zero()) };
-        std::array::from_fn(|c| self.mix(e, c) / self.mix(bound, c).max(S::one()))
+        rgb!(c => self.mix(e, c) / self.mix(bound, c).max(S::one()))
     }
 
     #[inline(always)]
-    pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    pub fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let e = self.bounds(w, curve);
-        std::array::from_fn(|c| self.mix(e, c).min(L::one()))
+        rgb!(c => self.mix(e, c).min(L::one()))
     }
 }
 
@@ -499,16 +505,17 @@ impl<S: Real, P: ClothParams> Lobe<S> for Woven<S, P> {
         P::table(values)
     }
 
-    fn new(params: &P, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &P, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         Woven { cloth: Cloth::new(&params.yarns(), wo, curve), params: PhantomData }
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.cloth.f(wi, curve)
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.cloth.pdf(wi)
     }
 
@@ -517,12 +524,12 @@ impl<S: Real, P: ClothParams> Lobe<S> for Woven<S, P> {
     }
 
     /// Exact where f is not divided; where it is, an upper estimate, as for `thread`.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.cloth.albedo(w, curve)
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.cloth.albedo_bound(w, curve)
     }
 }

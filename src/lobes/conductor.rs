@@ -14,7 +14,7 @@ use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::film::Film;
-use crate::optics::{Lift, Real, V3, fresnel};
+use crate::optics::{Lift, Over, Real, V3, fresnel};
 
 closure! {
     /// Reflection by a metal's facets, what bounces between them included. One-sided.
@@ -85,7 +85,7 @@ impl<S: Real> Lobe<S> for Conductor<S> {
         x != y
     }
 
-    fn new(params: &ConductorParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &ConductorParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let [n, k] = [params.ior, params.extinction].map(|v| v.map(S::from_f32));
         let [thickness, ior] = [params.thinfilm_thickness, params.thinfilm_ior].map(S::from_f32);
@@ -95,12 +95,12 @@ impl<S: Real> Lobe<S> for Conductor<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.surface.f(wi, curve.facets())
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.surface.pdf(wi)
     }
 
@@ -108,12 +108,12 @@ impl<S: Real> Lobe<S> for Conductor<S> {
         self.surface.sample(u)
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.surface.albedo(w, curve.facets())
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.surface.albedo_bound(w, curve.facets())
     }
 }

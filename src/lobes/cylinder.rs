@@ -13,7 +13,7 @@
 //! Nothing here calls an inverse function where angles cancel: with s = sin θi + sin θo and c = cos θi + cos θo,
 //! tan θh = s/c and s² + c² = 4 cos² θd; with unit vectors p around the thread, |pi + po| = 2 cos(φd/2).
 
-use crate::optics::{Lift, Real, V3, fresnel};
+use crate::optics::{Lift, Over, Real, V3, fresnel};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// cos θi + cos θo is taken as at least this: where both directions run along the thread the paper's division has no
@@ -98,7 +98,7 @@ impl<S: Real> Cylinder<S> {
 
     /// The parts of f, symmetric in their directions.
     #[inline(always)]
-    pub fn parts<L: Real + Lift<S>>(&self, o: Around<L>, i: Around<L>) -> Parts<L> {
+    pub fn parts<L: Over<S>>(&self, o: Around<L>, i: Around<L>) -> Parts<L> {
         let (s, c) = (o.sin + i.sin, o.cos + i.cos);
         let four_cos2_d = s.mul_add(s, c * c).max(L::c(1e-9));
         let inv_cos2_d = L::c(4.0) / four_cos2_d;
@@ -107,15 +107,20 @@ impl<S: Real> Cylinder<S> {
         let turned = ((o.py + i.py).sq() + (o.pz + i.pz).sq()).sqrt();
         let cos_half = (L::c(0.5) * turned).min(L::one());
         let reflected = fresnel::dielectric(L::lift(self.m), L::c(0.5) * four_cos2_d.sqrt() * cos_half);
-        let gauss = |(k, norm): (S, S)| L::lift(norm) * (-(L::lift(k) * th2)).exp();
         let half = L::c(0.5) * inv_cos2_d;
         let even = half * (L::one() - reflected).sq() / c.max(L::c(MIN_COS_SUM));
         Parts {
-            surface: half * reflected * L::c(0.25) * cos_half * gauss(self.surface),
-            forward: even * gauss(self.volume),
+            surface: half * reflected * L::c(0.25) * cos_half * gauss::<S, L>(self.surface, th2),
+            forward: even * gauss::<S, L>(self.volume, th2),
             even,
         }
     }
+}
+
+/// A Gaussian at the square of its argument.
+#[inline(always)]
+fn gauss<S: Real, L: Over<S>>((k, norm): (S, S), square: L) -> L {
+    L::lift(norm) * (-(L::lift(k) * square)).exp()
 }
 
 /// What a perfectly reflecting cylinder with a Gaussian of `width` (radians) sends out in all when it is seen at
@@ -192,7 +197,7 @@ impl<S: Real> Ridge<S> {
 
     /// Density over θi.
     #[inline(always)]
-    pub fn pdf<L: Real + Lift<S>>(&self, theta: L) -> L {
+    pub fn pdf<L: Over<S>>(&self, theta: L) -> L {
         logistic(theta - L::lift(self.center), L::lift(self.scale)) / L::lift(self.span)
     }
 

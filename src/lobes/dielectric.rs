@@ -13,14 +13,13 @@
 //! channel that loses least has it; others may lose 0.3 %.
 
 use super::interface::{Interface, index};
-use super::lanes::{each_lane, over_lanes};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{F32x8, Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3};
 
 closure! {
     /// Reflection and refraction between two media, what bounces between the facets included. Two-sided.
@@ -113,7 +112,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         params.thin_walled == 0
     }
 
-    fn new(params: &DielectricParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &DielectricParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let tints = [params.reflection_tint, params.transmission_tint];
         let (alpha, eta) = ([params.roughness_x, params.roughness_y], index(params.ior));
@@ -125,7 +124,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
-    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
         match self {
             Solid(surface) => Some(Solid(surface.toward(wo, curve.facets()))),
             Thin(_) => None,
@@ -133,7 +132,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Solid(surface) => surface.f(wi, curve.facets()),
             Thin(surface) => surface.f(wi, curve.facets()),
@@ -141,31 +140,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     }
 
     #[inline(always)]
-    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        match self {
-            Solid(surface) => surface.f_lanes(wi, curve.facets()),
-            Thin(surface) => over_lanes(wi, |w| surface.f::<f32>(w, curve.facets())),
-        }
-    }
-
-    #[inline(always)]
-    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        match self {
-            Solid(surface) => surface.pdf_lanes(wi),
-            Thin(surface) => each_lane(wi, |w| surface.pdf::<f32>(w)),
-        }
-    }
-
-    #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Solid(surface) => surface.pdf(wi),
             Thin(surface) => surface.pdf(wi),
@@ -179,7 +154,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
             Solid(surface) => surface.albedo(w, curve.facets()),
             Thin(surface) => surface.albedo(w, curve.facets()),
@@ -187,14 +162,15 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Solid(surface) => surface.albedo_bound(w, curve.facets()),
             Thin(surface) => surface.albedo_bound(w, curve.facets()),
         }
     }
 
-    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Solid(surface) => surface.relative_eta(wi),
             Thin(_) => L::one(),

@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 
 closure! {
     /// Lambertian reflection: f = 1/π where ωo and ωi lie on the normal's side. Albedo 1 on that side, 0 below.
@@ -38,22 +38,22 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
         Some(Limits::above(cos, 1.0, 1.0))
     }
 
-    fn new(_: &DiffuseParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(_: &DiffuseParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) }
     }
 
     #[inline(always)]
-    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Option<Self> {
         Some(Diffuse { value: S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero()) })
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::select(wi.z.gt(L::zero()), L::lift(self.value), L::zero()); 3]
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
 
@@ -62,12 +62,12 @@ impl<S: Real> Lobe<S> for Diffuse<S> {
     }
 
     #[inline(always)]
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::select(w.z.gt(L::zero()), L::one(), L::zero()); 3]
     }
 }

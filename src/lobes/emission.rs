@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Emitted radiance of 1 on the normal's side, none below. Scatters nothing and never counts as albedo; below a
@@ -36,15 +36,17 @@ impl<S: Real> Lobe<S> for Emission<S> {
         Some(Limits { lowest: 0.0, highest: 0.0 })
     }
 
-    fn new(_: &EmissionParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(_: &EmissionParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Emission { radiance: S::select(wo.z.gt(S::zero()), S::one(), S::zero()) }
     }
 
-    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, _: V3<L>) -> L {
         L::zero()
     }
 
@@ -52,11 +54,12 @@ impl<S: Real> Lobe<S> for Emission<S> {
         V3::new(S::zero(), S::zero(), S::one())
     }
 
-    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::zero(); 3]
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 }

@@ -15,7 +15,7 @@ use super::ltc_tables::EON;
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3, rgb};
 use std::f64::consts::{FRAC_1_PI, PI};
 
 closure! {
@@ -58,7 +58,8 @@ pub struct Eon<S> {
 
 impl<S: Real> Eon<S> {
     /// The single-scattering albedo for white facets, A + (B/π)·G(μ).
-    fn single<L: Real + Lift<S>>(&self, cos: L) -> L {
+    #[inline(always)]
+    fn single<L: Over<S>>(&self, cos: L) -> L {
         let cos = cos.clamp(L::zero(), L::one());
         let sin = (L::one() - cos.sq()).safe_sqrt();
         let theta = sin.atan2(cos);
@@ -69,14 +70,16 @@ impl<S: Real> Eon<S> {
         (L::lift(self.b) * L::c(FRAC_1_PI)).mul_add(g, L::lift(self.a)).min(L::one())
     }
 
+    #[inline(always)]
     fn on_side<L: Real>(cos: L, value: L) -> L {
         L::select(cos.gt(L::zero()), value, L::zero())
     }
 
     /// E for facets of albedo ρ: single scattering and what it leaves to the bounces.
-    fn total<L: Real + Lift<S>>(&self, cos: L) -> Rgb<L> {
+    #[inline(always)]
+    fn total<L: Over<S>>(&self, cos: L) -> Rgb<L> {
         let e = self.single(cos);
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let (rho, ms) = (L::lift(self.rho[c]), L::lift(self.rho_ms[c]));
             Self::on_side(cos, rho.mul_add(e, ms * (L::one() - e)).min(L::one()))
         })
@@ -95,7 +98,7 @@ impl<S: Real> Lobe<S> for Eon<S> {
         EonParams::SPEC.slot_of("albedo")
     }
 
-    fn new(params: &EonParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &EonParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let r = S::from_f32(params.roughness);
         let rho = params.albedo.map(S::from_f32);
         let a = S::one() / S::c(C1).mul_add(r, S::one());
@@ -119,7 +122,7 @@ impl<S: Real> Lobe<S> for Eon<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let s = wo.x.mul_add(wi.x, wo.y * wi.y);
         let forward = s / wo.z.max(wi.z).max(L::c(1e-6));
@@ -128,11 +131,11 @@ impl<S: Real> Lobe<S> for Eon<S> {
         let single = L::lift(self.a) * L::lift(self.roughness).mul_add(s, L::one()).max(L::zero());
         let bounced = L::lift(self.missing_o) * (L::one() - self.single(wi.z));
         let scale = Self::on_side(wi.z, L::lift(self.scale));
-        std::array::from_fn(|c| scale * L::lift(self.rho[c]).mul_add(single, L::lift(self.rho_ms[c]) * bounced))
+        rgb!(c => scale * L::lift(self.rho[c]).mul_add(single, L::lift(self.rho_ms[c]) * bounced))
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.ltc.pdf(wi)
     }
 
@@ -140,11 +143,12 @@ impl<S: Real> Lobe<S> for Eon<S> {
         self.ltc.sample(u)
     }
 
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.total(w.z)
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.total(w.z)
     }
 }

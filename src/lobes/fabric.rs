@@ -13,7 +13,7 @@ use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
 use crate::albedo::{COMPONENTS, FibreKey, FibreSpec, TableSpec};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -134,7 +134,7 @@ impl<S: Real> Fabric<S> {
     }
 
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn value<L: Over<S>>(&self, wi: V3<L>) -> L {
         let cos_i = wi.y.mul_add(wi.y, wi.z * wi.z).sqrt();
         let (s, c) = half_angle(L::lift(self.sin), L::lift(self.cos), wi.x, cos_i);
         L::select(wi.z.gt(L::zero()), falloff(s, c, L::lift(self.n)) * L::lift(self.scale), L::zero())
@@ -181,18 +181,19 @@ impl<S: Real> Lobe<S> for Fabric<S> {
         }))
     }
 
-    fn new(params: &FabricParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &FabricParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Fabric::prepare(exponent(params.roughness as f64, params.exponent as f64), wo)
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [self.value(wi); 3]
     }
 
     /// A mixture of μi/π and (1 − |sin θh|)ⁿ·cos θh/(2M·cos θi) · ½ cos φi. Both have the φi of the target; the second
     /// has its ridge, the first its cos² θi, which is what matters for small n.
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let across2 = wi.y.mul_add(wi.y, wi.z * wi.z);
         let (s, c) = half_angle(L::lift(self.sin), L::lift(self.cos), wi.x, across2.sqrt());
         let fall = falloff(s, c, L::lift(self.n)) * (L::lift(self.n) + L::one());
@@ -222,12 +223,12 @@ impl<S: Real> Lobe<S> for Fabric<S> {
         V3::new(pick(even.x, ridge.x), pick(even.y, ridge.y), pick(even.z, ridge.z))
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.fibre().view(w, self.place)[0]; 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         // Never above 1: the constant is that of the most reflecting direction.
         [curve.fibre().bound(w, L::lift(self.place))[0].min(L::one()); 3]
     }

@@ -9,7 +9,7 @@
 
 use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
 use super::{Evaluated, LobeKind, Rgb, Rgb32, Sides};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::{Mutex, PoisonError};
@@ -325,7 +325,8 @@ impl<S: Real> Host<S> {
     }
 
     /// Calls `f` with ωo and ωi, lane by lane.
-    fn lanes<L: Real + Lift<S>>(&self, wi: V3<L>, f: impl Fn([f64; 3], [f64; 3]) -> [f64; 3]) -> [L; 3] {
+    #[inline(always)]
+    fn lanes<L: Over<S>>(&self, wi: V3<L>, f: impl Fn([f64; 3], [f64; 3]) -> [f64; 3]) -> [L; 3] {
         let wo = V3::<L>::lift(self.wo);
         L::by_lane([wo.x, wo.y, wo.z, wi.x, wi.y, wi.z], |[a, b, c, x, y, z]| f([a, b, c], [x, y, z]))
     }
@@ -344,7 +345,8 @@ impl<S: Real> Host<S> {
     }
 
     /// See [`super::Lobe::f`].
-    pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>) -> Rgb<L> {
+    #[inline(always)]
+    pub fn f<L: Over<S>>(&self, wi: V3<L>) -> Rgb<L> {
         self.lanes(wi, |wo, wi| {
             let f = self.kind.0.lobe.f(&self.values, wo, wi).map(sane);
             let (o, i) = (self.bound_at(wo), self.bound_at(wi));
@@ -353,7 +355,8 @@ impl<S: Real> Host<S> {
     }
 
     /// See [`super::Lobe::pdf`].
-    pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.lanes(wi, |wo, wi| [sane(self.kind.0.lobe.pdf(&self.values, wo, wi)), 0.0, 0.0])[0]
     }
 
@@ -386,7 +389,8 @@ impl<S: Real> Host<S> {
     }
 
     /// See [`super::Lobe::albedo_bound`].
-    pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>) -> Rgb<L> {
+    #[inline(always)]
+    pub fn albedo_bound<L: Over<S>>(&self, w: V3<L>) -> Rgb<L> {
         L::by_lane([w.x, w.y, w.z], |w| self.bound_at(w).map(|e| e.min(1.0)))
     }
 }

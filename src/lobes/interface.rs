@@ -18,13 +18,12 @@
 //!
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
-use super::lanes::{each_lane, over_lanes_of};
 use super::rough::{Reflectance, chance, even, largest, split};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{F32x8, Lift, Real, V3, fresnel, sampling};
+use crate::optics::{Lift, Over, Real, V3, array, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// The index that is used for a script's: between 1/4 and 4, and no closer to 1 than 1 %, where refraction would become
@@ -34,6 +33,7 @@ pub(super) fn index(eta: f32) -> f64 {
     if eta >= 1.0 { eta.max(1.01) } else { eta.min(0.99) }
 }
 
+#[inline(always)]
 fn mean<L: Real>(color: Rgb<L>) -> L {
     (color[0] + color[1] + color[2]) * L::c(1.0 / 3.0)
 }
@@ -75,7 +75,7 @@ impl<S: Real> Interface<S> {
         (eta, colored): (f64, Option<Reflectance<S>>),
         tints: [Rgb<f32>; 2],
         wo: V3<S>,
-        tables: &FacetTables<S>,
+        tables: &FacetTables<S::Entry>,
     ) -> Self {
         let facets = Facets::new(shape, [S::from_f32(even(alpha)); 2]);
         let sides = Sides::tinted(tints);
@@ -104,7 +104,7 @@ impl<S: Real> Interface<S> {
     }
 
     /// The same surface seen from another ωo.
-    pub(super) fn toward(self, wo: V3<S>, tables: &FacetTables<S>) -> Self {
+    pub(super) fn toward(self, wo: V3<S>, tables: &FacetTables<S::Entry>) -> Self {
         let Interface { facets, eta, odds, .. } = self;
         let outside = wo.z.gt(S::zero());
         // Both are computed, because a Real cannot branch.
@@ -135,7 +135,7 @@ impl<S: Real> Interface<S> {
 
     /// Whether ωi lies on ωo's side, and whether on the other.
     #[inline(always)]
-    fn sides<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L::Mask, L::Mask) {
+    fn sides<L: Over<S>>(&self, wi: V3<L>) -> (L::Mask, L::Mask) {
         let (cos_o, cos_i) = (L::lift(self.wo.z), wi.z);
         let lit = cos_o.abs().gt(L::zero()) & cos_i.abs().gt(L::zero());
         let same = (cos_i * L::lift(self.side)).gt(L::zero());
@@ -144,7 +144,7 @@ impl<S: Real> Interface<S> {
 
     /// Of refraction from ωo to ωi: h, the product of the cosines times n²/|h|⁴ (0 where no facet does it), 1 − F.
     #[inline(always)]
-    fn refraction<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L, Rgb<L>) {
+    fn refraction<L: Over<S>>(&self, wi: V3<L>) -> (V3<L>, L, Rgb<L>) {
         let wo = V3::<L>::lift(self.wo);
         let outside = L::lift(self.side).gt(L::zero());
         let pick = |a: L, b: L| L::select(outside, a, b);
@@ -156,9 +156,6 @@ impl<S: Real> Interface<S> {
         let h = V3::new(sum(out.x, inn.x), sum(out.y, inn.y), sum(out.z, inn.z));
         let length2 = h.length_squared().max(L::c(1e-12));
         let n2 = pick(L::c(self.eta * self.eta), L::one());
-        let met = |c_out: L, c_in: L| c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
-        let jacobian =
-            |c_out: L, c_in: L| L::select(met(c_out, c_in), c_out * c_in * n2 / (length2 * length2), L::zero());
         if let Some(law) = &self.colored {
             // The cosines, and what the outer one lacks of 1 from the sine: |out × h| is η·|out × in|. In double precision,
             // because a grazing cosine is a small difference and unlike Fresnel's, this 1 − F does not vanish there.
@@ -173,7 +170,7 @@ impl<S: Real> Interface<S> {
             let cos = c_out / length2.sqrt();
             let rest = match law {
                 Reflectance::Coated(n, _, film) => {
-                    let [n0, n1, n2, thickness, ior] = [n[0], n[1], n[2], film.thickness, film.ior].map(L::lift);
+                    let [n0, n1, n2, thickness, ior] = lifted([n[0], n[1], n[2], film.thickness, film.ior]);
                     let all = [out.x, out.y, out.z, inn.x, inn.y, inn.z, n0, n1, n2, thickness, ior];
                     // The cosine too: what passes has a root's slope next to the critical angle.
                     L::by_lane(all, |v| {
@@ -186,20 +183,29 @@ impl<S: Real> Interface<S> {
                 }
                 _ => law.rest(cos, sine2 / (length2 * (L::one() + cos.max(L::zero())))),
             };
-            return (h, jacobian(c_out, c_in), rest.map(|r| L::select(met(c_out, c_in), r, L::zero())));
+            let (met, jacobian) = Self::met(h, c_out, c_in, n2 / (length2 * length2));
+            return (h, jacobian, rgb!(c => L::select(met, rest[c], L::zero())));
         }
         let (c_out, c_in) = (out.dot(h), -inn.dot(h));
         // 1 − F from both cosines, in any unit: nothing cancels toward the critical angle.
         let eta = L::c(self.eta);
         let (s, p) = (eta.mul_add(c_in, c_out), eta.mul_add(c_out, c_in));
         let both = L::one() / s.sq().max(L::c(1e-12)) + L::one() / p.sq().max(L::c(1e-12));
-        let passed = L::select(met(c_out, c_in), L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
-        (h, jacobian(c_out, c_in), [passed; 3])
+        let (met, jacobian) = Self::met(h, c_out, c_in, n2 / (length2 * length2));
+        let passed = L::select(met, L::c(2.0) * eta * c_out * c_in * both, L::zero()).min(L::one());
+        (h, jacobian, [passed; 3])
+    }
+
+    /// Whether a facet along `h` is met from both sides, and there the product of the cosines times `scale`.
+    #[inline(always)]
+    fn met<L: Real>(h: V3<L>, c_out: L, c_in: L, scale: L) -> (L::Mask, L) {
+        let met = c_out.gt(L::zero()) & c_in.gt(L::zero()) & h.z.gt(L::zero());
+        (met, L::select(met, c_out * c_in * scale, L::zero()))
     }
 
     /// F of the facet that mirrors ωo to ωi.
     #[inline(always)]
-    fn reflectance<L: Real + Lift<S>>(&self, wi: V3<L>) -> Rgb<L> {
+    fn reflectance<L: Over<S>>(&self, wi: V3<L>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let eta = self.eta;
         // In double precision, because toward the critical angle the sum for g² cancels.
@@ -217,7 +223,7 @@ impl<S: Real> Interface<S> {
         let cos = L::select(outside, c, bent);
         let sine2 = L::select(outside, fall, fall * L::c(eta * eta));
         let f = law.at(cos, sine2 / (L::one() + cos));
-        f.map(|f| L::select(g2.gt(L::zero()), f, L::one()))
+        rgb!(c => L::select(g2.gt(L::zero()), f[c], L::one()))
     }
 
     /// [`Self::reflectance`] of a facet that ωo meets at the cosine `c`, all channels alike.
@@ -242,47 +248,13 @@ impl<S: Real> Interface<S> {
     }
 
     #[inline(always)]
-    pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         self.value(wi, tables.missing(wi, self.facets.alpha()))
-    }
-
-    /// [`f`](Self::f) for every lane, the same bits. What is chosen and what reads tables stands outside the loop.
-    #[inline(always)]
-    pub(super) fn f_lanes(&self, wi: &V3<F32x8>, tables: &FacetTables<S>) -> Rgb<F32x8>
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        let missing = tables.missing(*wi, self.facets.alpha());
-        match self.plain() {
-            Some(plain) => over_lanes_of(wi, [missing], |w, [missing]| plain.value(w, missing)),
-            None => over_lanes_of(wi, [missing], |w, [missing]| self.value(w, missing)),
-        }
-    }
-
-    /// [`pdf`](Self::pdf) likewise.
-    #[inline(always)]
-    pub(super) fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        match self.plain() {
-            Some(plain) => each_lane(wi, |w| plain.pdf::<f32>(w)),
-            None => each_lane(wi, |w| self.pdf::<f32>(w)),
-        }
-    }
-
-    /// Itself, in words that the compiler sees as constants, if it is the plainest: Fresnel's reflectance and GGX slopes.
-    #[inline(always)]
-    fn plain(&self) -> Option<Self> {
-        let facets = self.facets.proposal();
-        (self.colored.is_none() && self.facets.is_ggx()).then_some(Interface { colored: None, facets, ..*self })
     }
 
     /// f where `missing` is what the tables say at ωi.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, missing: L) -> Rgb<L> {
+    fn value<L: Over<S>>(&self, wi: V3<L>, missing: L) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let (same, other) = self.sides(wi);
         let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
@@ -291,8 +263,8 @@ impl<S: Real> Interface<S> {
         let reflectance = self.reflectance(wi);
         let (h, jacobian, passed) = self.refraction(wi);
         let bent = jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
-        let [back_again, on_again] = self.again.map(|a| L::lift(a) * missing);
-        std::array::from_fn(|c| {
+        let [back_again, on_again] = array(|k| L::lift(self.again[k]) * missing);
+        rgb!(c => {
             let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);
             let on = L::lift(self.refracted[c]) * passed[c].mul_add(bent, on_again);
             L::select(same, back, L::select(other, on, L::zero()))
@@ -301,12 +273,12 @@ impl<S: Real> Interface<S> {
 
     /// Probability of reflecting at a facet with reflectance `f`.
     #[inline(always)]
-    fn chance<L: Real + Lift<S>>(&self, f: L) -> L {
-        chance(f, self.odds.map(L::lift))
+    fn chance<L: Over<S>>(&self, f: L) -> L {
+        chance(f, lifted(self.odds))
     }
 
     #[inline(always)]
-    pub(super) fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let wo = V3::<L>::lift(self.wo);
         let (same, other) = self.sides(wi);
         let (cos_o, proposal) = (wo.z.abs(), L::lift(self.proposal));
@@ -359,7 +331,7 @@ impl<S: Real> Interface<S> {
     }
 
     /// Best estimate of the albedo.
-    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
+    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S::Entry>) -> Rgb<S> {
         let missing = tables.missing(w, self.facets.alpha());
         if tables.has_parts() {
             return self.total(w, missing, self.sorted(tables.view(w)));
@@ -371,13 +343,13 @@ impl<S: Real> Interface<S> {
 
     /// Never below the albedo, from either side.
     #[inline(always)]
-    pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn albedo_bound<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         let missing = tables.missing(w, self.facets.alpha());
         if tables.has_parts() {
             return self.total(w, missing, self.sorted(tables.bound(w)));
         }
         let largest = |c: usize| L::lift(self.reflected[c].max(self.refracted[c]));
-        std::array::from_fn(|c| L::select(w.z.abs().gt(L::zero()), largest(c), L::zero()))
+        rgb!(c => L::select(w.z.abs().gt(L::zero()), largest(c), L::zero()))
     }
 
     /// Reflected and refracted parts per channel.
@@ -388,10 +360,10 @@ impl<S: Real> Interface<S> {
     }
 
     #[inline(always)]
-    fn total<L: Real + Lift<S>>(&self, w: V3<L>, missing: L, [back, on]: [Rgb<L>; 2]) -> Rgb<L> {
+    fn total<L: Over<S>>(&self, w: V3<L>, missing: L, [back, on]: [Rgb<L>; 2]) -> Rgb<L> {
         let near = (w.z * L::lift(self.side)).gt(L::zero());
         let crossing = L::select(near, L::lift(self.crossing[0]), L::lift(self.crossing[1]));
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let (back, on) = (missing.mul_add(L::one() - crossing, back[c]), missing.mul_add(crossing, on[c]));
             let sum = L::lift(self.reflected[c]).mul_add(back, L::lift(self.refracted[c]) * on);
             // A part that is next to nothing may have been integrated to less.
@@ -402,7 +374,7 @@ impl<S: Real> Interface<S> {
 
     /// Index on ωo's side over that on ωi's.
     #[inline(always)]
-    pub(super) fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    pub(super) fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         let (_, other) = self.sides(wi);
         L::select(other, L::one() / L::lift(self.far), L::one())
     }

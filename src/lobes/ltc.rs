@@ -5,7 +5,7 @@
 //! keeps the horizon where it is, so the density integrates to 1 over the hemisphere. The parameters a, b, c come from
 //! tables over ωo's cosine and the roughness, fitted by `examples/fit_sheen.rs`.
 
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, array, lifted, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// Nodes of a table over √μ.
@@ -36,7 +36,7 @@ pub fn read<S: Real>(table: &Table, cos: S, roughness: S) -> [S; PARAMS] {
     let (t, u) = (x - i, y - j);
     let params = S::c(PARAMS as f64);
     let corner = j.mul_add(S::c(COS_NODES as f64), i) * params;
-    std::array::from_fn(|p| {
+    array(|p| {
         let pick = |offset: usize| S::pick(table, corner + S::c((offset * PARAMS + p) as f64));
         let mix = |a: S, b: S, t: S| (b - a).mul_add(t, a);
         mix(mix(pick(0), pick(1), t), mix(pick(COS_NODES), pick(COS_NODES + 1), t), u)
@@ -54,12 +54,12 @@ pub(super) fn row(table: &Table, roughness: f64) -> Vec<f64> {
 
 /// The four numbers of a [`row`] at a cosine, linearly.
 #[inline(always)]
-pub(super) fn read_row<S: Real>(row: &[S], cos: S) -> [S; PARAMS] {
+pub(super) fn read_row<S: Real>(row: &[S::Entry], cos: S) -> [S; PARAMS] {
     let x = cos.clamp(S::zero(), S::one()).sqrt() * S::c((COS_NODES - 1) as f64);
     let i = x.whole().min(S::c((COS_NODES - 2) as f64));
     let start = i * S::c(PARAMS as f64);
     let both: [S; 2 * PARAMS] = S::run(row, start);
-    std::array::from_fn(|p| (both[PARAMS + p] - both[p]).mul_add(x - i, both[p]))
+    array(|p| (both[PARAMS + p] - both[p]).mul_add(x - i, both[p]))
 }
 
 /// A transformed cosine, turned toward ωo's azimuth, and the share of uniform directions mixed into it.
@@ -91,8 +91,8 @@ impl<S: Real> Ltc<S> {
 
     /// The density over cos θ of the transformed cosine alone; finite at the horizon. Meant for z ≥ 0.
     #[inline(always)]
-    pub fn density_over_cos<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
-        let [cos, sin] = self.turn.map(L::lift);
+    pub fn density_over_cos<L: Over<S>>(&self, w: V3<L>) -> L {
+        let [cos, sin] = lifted::<_, L, 2>(self.turn);
         let x = L::lift(self.a) * cos.mul_add(w.x, sin * w.y) + L::lift(self.c) * w.z;
         let y = L::lift(self.b) * (cos * w.y - sin * w.x);
         let length2 = x.mul_add(x, y.mul_add(y, w.z * w.z)).max(L::c(1e-15));
@@ -101,7 +101,7 @@ impl<S: Real> Ltc<S> {
 
     /// Density over solid angle of [`sample`](Self::sample); 0 below the surface.
     #[inline(always)]
-    pub fn pdf<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
+    pub fn pdf<L: Over<S>>(&self, w: V3<L>) -> L {
         let uniform = L::lift(self.uniform);
         let ltc = self.density_over_cos(w) * w.z;
         let pdf = (L::one() - uniform).mul_add(ltc, uniform * L::c(0.5 * FRAC_1_PI));

@@ -10,7 +10,7 @@ use super::registry::{ClosureParams, closure};
 use super::rough::widths;
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3};
 
 closure! {
     /// Reflection by a metal's facets, the metal given by its colors. One-sided.
@@ -75,7 +75,7 @@ impl<S: Real> Lobe<S> for Metal<S> {
         x != y
     }
 
-    fn new(params: &MetalParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &MetalParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let MetalParams { N, U, roughness_x, roughness_y, reflectivity, edge_tint, distribution, .. } = *params;
         let (ior, extinction) = artistic_ior(reflectivity, edge_tint);
         let MetalParams { thinfilm_thickness, thinfilm_ior, .. } = *params;
@@ -94,12 +94,12 @@ impl<S: Real> Lobe<S> for Metal<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.metal.f(wi, curve)
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.metal.pdf(wi)
     }
 
@@ -107,12 +107,12 @@ impl<S: Real> Lobe<S> for Metal<S> {
         self.metal.sample(u)
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.metal.albedo(w, curve)
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.metal.albedo_bound(w, curve)
     }
 }

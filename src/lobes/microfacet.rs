@@ -18,7 +18,7 @@ use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_wid
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Reflection and refraction by microscopic facets, what bounces between them included. Without an index it is white
@@ -100,7 +100,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         two_media(params.eta, params.refract)
     }
 
-    fn new(params: &MicrofacetParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &MicrofacetParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let alpha = [params.xalpha, params.yalpha];
         if two_media(params.eta, params.refract) {
@@ -113,7 +113,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Mirror(surface) => surface.f(wi, curve.facets()),
             Glass(surface) => surface.f(wi, curve.facets()),
@@ -121,7 +121,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Mirror(surface) => surface.pdf(wi),
             Glass(surface) => surface.pdf(wi),
@@ -135,7 +135,7 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         }
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
             Mirror(surface) => surface.albedo(w, curve.facets()),
             Glass(surface) => surface.albedo(w, curve.facets()),
@@ -143,14 +143,15 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Mirror(surface) => surface.albedo_bound(w, curve.facets()),
             Glass(surface) => surface.albedo_bound(w, curve.facets()),
         }
     }
 
-    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Mirror(_) => L::one(),
             Glass(surface) => surface.relative_eta(wi),

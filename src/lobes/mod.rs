@@ -23,7 +23,6 @@ pub mod eon;
 pub mod fabric;
 pub mod host;
 mod interface;
-mod lanes;
 pub mod limits;
 mod ltc_tables;
 pub mod metal;
@@ -47,8 +46,7 @@ pub mod velvet;
 pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
-use crate::optics::{F32x8, Lift, Real, V3};
-use lanes::{each_lane, over_lanes};
+use crate::optics::{Lift, Over, Real, V3};
 use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
@@ -126,59 +124,40 @@ pub trait Lobe<S: Real>: Sized + Copy {
 
     /// The index of refraction on ωo's side over that on ωi's; 1 unless light crosses into another medium. The adjoint
     /// of f is f times its square.
-    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         let _ = wi;
         L::one()
     }
 
     /// Prepares everything that depends on the parameters and on ωo alone.
-    fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self;
+    fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self;
 
     /// The same lobe for another ωo: the bits that [`new`](Lobe::new) gives for the same parameters. `None` if there is no
     /// shorter way.
-    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
         let _ = (wo, curve);
         None
     }
 
     /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
-
-    /// [`f`](Lobe::f) for every lane, the same bits. A lobe of several variants takes its choice here, outside the loop.
-    #[inline(always)]
-    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        over_lanes(wi, |w| self.f::<f32>(w, curve))
-    }
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L>;
 
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L;
-
-    /// [`pdf`](Lobe::pdf) for every lane, the same bits; see [`f_lanes`](Lobe::f_lanes).
-    #[inline(always)]
-    fn pdf_lanes(&self, wi: &V3<F32x8>) -> F32x8
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        each_lane(wi, |w| self.pdf::<f32>(w))
-    }
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L;
 
     /// A direction for two uniform numbers in [0, 1); one in the horizon, z = 0, says that there is none for these.
     fn sample(&self, u: [S; 2]) -> V3<S>;
 
     /// Best estimate of E_view(ω) = ∫ f(ω, ωi)·|cos θi| dωi.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S>;
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S>;
 
     /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L>;
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L>;
 
     /// Never below E_view(ω), on ω's own side: [`albedo_bound`](Lobe::albedo_bound), unless a lobe that is not
     /// reciprocal has a tighter one.
-    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.albedo_bound(w, curve)
     }
 
@@ -224,21 +203,19 @@ pub struct Evaluated<L> {
 }
 
 #[inline(always)]
-fn evaluate<S: Real>(lobe: &impl Lobe<S>, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
-    let bound = if bound { lobe.albedo_bound(wi, curve) } else { [S::zero(); 3] };
+fn evaluate<S: Real, L: Over<S>>(
+    lobe: &impl Lobe<S>,
+    wi: V3<L>,
+    curve: &AlbedoCurve<S::Entry>,
+    bound: bool,
+) -> Evaluated<L> {
+    let bound = if bound { lobe.albedo_bound(wi, curve) } else { [L::zero(); 3] };
     Evaluated { f: lobe.f(wi, curve), pdf: lobe.pdf(wi), bound }
 }
 
 #[inline(always)]
-fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
     [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
-}
-
-/// Long formulas as loops over the lanes, which the compiler makes vector code of; what only reads a table as it is.
-#[inline(always)]
-fn evaluate_lanes(lobe: &impl Lobe<f32>, wi: &V3<F32x8>, curve: &AlbedoCurve<f32>, bound: bool) -> Evaluated<F32x8> {
-    let bound = if bound { lobe.albedo_bound(*wi, curve) } else { [F32x8::zero(); 3] };
-    Evaluated { f: lobe.f_lanes(wi, curve), pdf: lobe.pdf_lanes(wi), bound }
 }
 
 macro_rules! lobes {
@@ -329,7 +306,7 @@ macro_rules! lobes {
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
-            pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+            pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
                 match kind {
                     $( LobeKind::$Lobe => AnyLobe::$Lobe(
                         <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)), )*
@@ -338,7 +315,7 @@ macro_rules! lobes {
             }
             /// See [`Lobe::toward`]. Written in place, because there is room for the largest lobe. False, and nothing is
             /// written, if there is no shorter way than [`new`](Self::new).
-            pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
+            pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
                 match self {
                     $( AnyLobe::$Lobe(l) => {
                         let turned = Lobe::<S>::toward(l, wo, curve);
@@ -356,7 +333,7 @@ macro_rules! lobes {
             }
             /// What evaluating a BSDF needs of a lobe, in one call.
             #[inline(always)]
-            pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+            pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
                     AnyLobe::Diffuse(l) => evaluate(l, wi, curve, bound),
                     AnyLobe::Sheen(l) => evaluate(l, wi, curve, bound),
@@ -366,7 +343,7 @@ macro_rules! lobes {
             }
             /// Apart, so that a walk stays short whatever lobes there are.
             #[inline(never)]
-            fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> Evaluated<S> {
+            fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
                     $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
                     AnyLobe::Host(l) => l.evaluate(wi, bound),
@@ -374,12 +351,12 @@ macro_rules! lobes {
             }
             /// See [`Lobe::f`].
             #[inline]
-            pub fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+            pub fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
                 match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve), )* AnyLobe::Host(l) => l.f(wi) }
             }
             /// See [`Lobe::pdf`].
             #[inline]
-            pub fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+            pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
                 match self { $( AnyLobe::$Lobe(l) => l.pdf(wi), )* AnyLobe::Host(l) => l.pdf(wi) }
             }
             /// See [`Lobe::sample`].
@@ -389,16 +366,16 @@ macro_rules! lobes {
             }
             /// See [`Lobe::albedo`].
             #[inline]
-            pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+            pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
                 match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve), )* AnyLobe::Host(l) => l.albedo(w) }
             }
             /// See [`Lobe::albedo_bound`].
             #[inline]
-            pub fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+            pub fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
                 match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::view_bound`].
-            pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+            pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
                 match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::sides`].
@@ -411,7 +388,7 @@ macro_rules! lobes {
             }
             /// See [`Lobe::relative_eta`].
             #[inline]
-            pub fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+            pub fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
                 match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
             }
             /// See [`Lobe::delta`].
@@ -425,7 +402,7 @@ macro_rules! lobes {
             /// [`albedo`](Self::albedo), and [`albedo_bound`](Self::albedo_bound) if it is asked for. Here, not in a call, for
             /// the lobes that most materials are made of: three numbers that come from a call have to be waited for.
             #[inline(always)]
-            pub(crate) fn albedos(&self, w: V3<S>, curve: &AlbedoCurve<S>, bound: bool) -> [Rgb<S>; 2] {
+            pub(crate) fn albedos(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
                 match self {
                     AnyLobe::Diffuse(l) => albedos(l, w, curve, bound),
                     AnyLobe::Sheen(l) => albedos(l, w, curve, bound),
@@ -443,18 +420,19 @@ macro_rules! lobes {
             }
         }
 
-        impl AnyLobe<f32> {
-            /// [`evaluate`](Self::evaluate) for lanes side by side, the same bits.
+        impl<S: Real> AnyLobe<S> {
+            /// [`evaluate`](Self::evaluate) for lanes side by side, the same bits. All of it in one place: what is called is
+            /// not compiled for the processor's vectors.
             #[inline(always)]
-            pub fn evaluate_lanes(
+            pub(crate) fn evaluate_lanes<L: Over<S>>(
                 &self,
-                wi: &V3<F32x8>,
-                curve: &AlbedoCurve<f32>,
+                wi: V3<L>,
+                curve: &AlbedoCurve<S::Entry>,
                 bound: bool,
-            ) -> Evaluated<F32x8> {
-                match *self {
-                    $( AnyLobe::$Lobe(l) => evaluate_lanes(&l, wi, curve, bound), )*
-                    AnyLobe::Host(l) => Evaluated { f: l.f(*wi), pdf: l.pdf(*wi), bound: l.albedo_bound(*wi) },
+            ) -> Evaluated<L> {
+                match self {
+                    $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
+                    AnyLobe::Host(l) => Evaluated { f: l.f(wi), pdf: l.pdf(wi), bound: l.albedo_bound(wi) },
                 }
             }
         }

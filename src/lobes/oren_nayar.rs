@@ -10,7 +10,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -42,7 +42,7 @@ impl<S: Real> OrenNayar<S> {
     /// The published lobe's albedo at `cos` > 0: A + B/π·[sin θ(θ − sin θ cos θ) + ⅔·tan θ(1 − sin³ θ)], written so
     /// that nothing cancels at grazing angles; next to the normal the sine has digits that the cosine has lost.
     #[inline(always)]
-    fn raw_albedo<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
+    fn raw_albedo<L: Over<S>>(&self, w: V3<L>) -> L {
         let cos = w.z.clamp(L::zero(), L::one());
         let sin = w.x.mul_add(w.x, w.y.sq()).sqrt().min(L::one());
         let theta = sin.atan2(cos);
@@ -51,6 +51,7 @@ impl<S: Real> OrenNayar<S> {
         (L::lift(self.b) * L::c(FRAC_1_PI)).mul_add(near + far, L::lift(self.a))
     }
 
+    #[inline(always)]
     fn on_side<L: Real>(cos: L, value: L) -> L {
         L::select(cos.gt(L::zero()), value, L::zero())
     }
@@ -86,7 +87,7 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         Some(Limits::above(cos, 0.0, highest.min(1.0)))
     }
 
-    fn new(params: &OrenNayarParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &OrenNayarParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let var = S::from_f32(params.sigma).sq();
         let lobe = OrenNayar {
             a: S::one() - S::c(0.5) * var / (var + S::c(0.33)),
@@ -98,13 +99,13 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         OrenNayar { excess: lobe.raw_albedo(wo).max(S::one()), ..lobe }
     }
 
-    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S>) -> Option<Self> {
+    fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Option<Self> {
         let excess = self.raw_albedo(wo).max(S::one());
         Some(OrenNayar { wo, excess, scale: Self::on_side(wo.z, S::c(FRAC_1_PI)), ..*self })
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         // sin θi·sin θo·cos Δφ over the larger cosine is sin α·tan β·cos Δφ.
         let across = (wo.x * wi.x + wo.y * wi.y).max(L::zero());
@@ -115,7 +116,7 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
 
@@ -124,12 +125,12 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
     }
 
     #[inline(always)]
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [Self::on_side(w.z, self.raw_albedo(w).min(S::one())); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [Self::on_side(w.z, self.raw_albedo(w).min(L::one())); 3]
     }
 }

@@ -11,7 +11,7 @@ use super::oren_nayar::{OrenNayar, OrenNayarParams};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Rough diffuse reflection with a color. Roughness 0 is Lambert. One-sided.
@@ -56,7 +56,7 @@ impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
         if params.energy_compensation == 0 { params.albedo } else { [1.0; 3] }
     }
 
-    fn new(params: &OrenNayarDiffuseParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &OrenNayarDiffuseParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let OrenNayarDiffuseParams { N, albedo, roughness, energy_compensation } = *params;
         if energy_compensation == 0 {
             Single(OrenNayar::new(&OrenNayarParams { N, sigma: roughness }, wo, curve))
@@ -66,7 +66,7 @@ impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Single(lobe) => lobe.f(wi, curve),
             Kept(lobe) => lobe.f(wi, curve),
@@ -74,7 +74,7 @@ impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Single(lobe) => lobe.pdf(wi),
             Kept(lobe) => lobe.pdf(wi),
@@ -88,7 +88,7 @@ impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
         }
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
             Single(lobe) => lobe.albedo(w, curve),
             Kept(lobe) => lobe.albedo(w, curve),
@@ -96,7 +96,7 @@ impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Single(lobe) => lobe.albedo_bound(w, curve),
             Kept(lobe) => lobe.albedo_bound(w, curve),

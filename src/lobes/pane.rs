@@ -14,7 +14,7 @@ use super::rough::{chance, largest, split, thin};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Real, V3, fresnel, sampling};
+use crate::optics::{Lift, Over, Real, V3, array, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// What a pane reflects at the cosine `c`; `m` is η² − 1.
@@ -63,7 +63,7 @@ impl<S: Real> Pane<S> {
         eta: f64,
         tints: [Rgb<f32>; 2],
         wo: V3<S>,
-        tables: &FacetTables<S>,
+        tables: &FacetTables<S::Entry>,
     ) -> Self {
         let alpha = thin(alpha, eta).map(S::from_f32);
         let facets = Facets::new(shape, alpha);
@@ -97,7 +97,7 @@ impl<S: Real> Pane<S> {
 
     /// ωi folded to the normal's side, and whether it lies on ωo's side, and whether on the other.
     #[inline(always)]
-    fn folded<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L::Mask, L::Mask) {
+    fn folded<L: Over<S>>(&self, wi: V3<L>) -> (V3<L>, L::Mask, L::Mask) {
         let lit = wi.z.abs().gt(L::zero()) & L::lift(self.wo.z).gt(L::zero());
         let same = (wi.z * L::lift(self.side)).gt(L::zero());
         (V3::new(wi.x, wi.y, wi.z.abs()), lit & same, lit & !same)
@@ -113,7 +113,7 @@ impl<S: Real> Pane<S> {
     }
 
     #[inline(always)]
-    pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         let (wi, same, other) = self.folded(wi);
         let wo = V3::<L>::lift(self.wo);
         let h = wo + wi;
@@ -121,9 +121,9 @@ impl<S: Real> Pane<S> {
         let single = self.facets.d(h) * L::c(0.5) / shadowed.max(L::c(1e-18));
         let r = reflected(L::lift(self.m), L::c(0.5) * h.length_squared().sqrt());
         let missing = tables.missing(wi, self.facets.alpha());
-        let [back, on] = self.again.map(|a| L::lift(a) * missing);
+        let [back, on] = array(|k| L::lift(self.again[k]) * missing);
         let (back, on) = (r.mul_add(single, back), (L::one() - r).mul_add(single, on));
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let (back, on) = (L::lift(self.tints[0][c]) * back, L::lift(self.tints[1][c]) * on);
             L::select(same, back, L::select(other, on, L::zero()))
         })
@@ -131,12 +131,12 @@ impl<S: Real> Pane<S> {
 
     /// Probability of reflecting at a facet with reflectance `r`.
     #[inline(always)]
-    fn chance<L: Real + Lift<S>>(&self, r: L) -> L {
-        chance(r, self.odds.map(L::lift))
+    fn chance<L: Over<S>>(&self, r: L) -> L {
+        chance(r, lifted(self.odds))
     }
 
     #[inline(always)]
-    pub(super) fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let (wi, same, other) = self.folded(wi);
         let h = V3::<L>::lift(self.wo) + wi;
         let r = reflected(L::lift(self.m), L::c(0.5) * h.length_squared().sqrt());
@@ -167,7 +167,7 @@ impl<S: Real> Pane<S> {
     }
 
     /// Best estimate of the albedo.
-    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
+    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S::Entry>) -> Rgb<S> {
         let w = V3::new(w.x, w.y, w.z.abs());
         let missing = tables.missing(w, self.facets.alpha());
         let view = tables.view(w);
@@ -179,10 +179,10 @@ impl<S: Real> Pane<S> {
 
     /// Never below the albedo, from either side.
     #[inline(always)]
-    pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn albedo_bound<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         let w = V3::new(w.x, w.y, w.z.abs());
         let most = |c: usize| L::lift(self.tints[0][c].max(self.tints[1][c]));
-        let most: Rgb<L> = std::array::from_fn(|c| L::select(w.z.gt(L::zero()), most(c), L::zero()));
+        let most: Rgb<L> = rgb!(c => L::select(w.z.gt(L::zero()), most(c), L::zero()));
         if !tables.has_parts() {
             return most;
         }
@@ -190,14 +190,14 @@ impl<S: Real> Pane<S> {
         let parts = self.total(w, tables.missing(w, self.facets.alpha()), [bound[0], bound[1]]);
         // Where it begins to reflect totally, what it reflects jumps between two nodes: all may be of the brighter part.
         let jumps = L::lift(self.m).lt(L::zero());
-        std::array::from_fn(|c| L::select(jumps, most[c], parts[c]))
+        rgb!(c => L::select(jumps, most[c], parts[c]))
     }
 
     #[inline(always)]
-    fn total<L: Real + Lift<S>>(&self, w: V3<L>, missing: L, [back, on]: [L; 2]) -> Rgb<L> {
+    fn total<L: Over<S>>(&self, w: V3<L>, missing: L, [back, on]: [L; 2]) -> Rgb<L> {
         let back = missing.mul_add(L::lift(self.shared), back);
         let on = missing.mul_add(L::one() - L::lift(self.shared), on);
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let sum = L::lift(self.tints[0][c]).mul_add(back, L::lift(self.tints[1][c]) * on);
             let sum = sum.clamp(L::zero(), L::one());
             L::select(w.z.gt(L::zero()), sum, L::zero())

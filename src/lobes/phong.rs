@@ -15,7 +15,7 @@ use super::{Lobe, Rgb};
 use crate::albedo::curve::no_extra;
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 use std::sync::OnceLock;
 
@@ -74,7 +74,7 @@ fn albedo(n: f64, mu: f64) -> f64 {
 impl<S: Real> Phong<S> {
     /// tan²α and whether α is below 90°: 1 − cos α is half the square of the difference, which keeps its digits.
     #[inline(always)]
-    fn spread<L: Real + Lift<S>>(&self, wi: V3<L>) -> (L, L::Mask) {
+    fn spread<L: Over<S>>(&self, wi: V3<L>) -> (L, L::Mask) {
         let wo = V3::<L>::lift(self.wo);
         let d = V3::new(wo.x + wi.x, wo.y + wi.y, wi.z - wo.z);
         let d2 = d.length_squared();
@@ -86,7 +86,7 @@ impl<S: Real> Phong<S> {
 
     /// cosⁿα.
     #[inline(always)]
-    fn power<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn power<L: Over<S>>(&self, wi: V3<L>) -> L {
         let (tan2, lit) = self.spread(wi);
         let power = (L::c(-0.5) * L::lift(self.exponent) * tan2.ln_1p()).exp();
         L::select(lit, power, L::zero())
@@ -131,7 +131,7 @@ impl<S: Real> Lobe<S> for Phong<S> {
         Some(Limits::above(cos, (low[0].min(low[1]) - 5e-3).max(0.0), (high[0].max(high[1]) + 1e-2).min(1.0)))
     }
 
-    fn new(params: &PhongParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &PhongParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let n = S::from_f32(params.exponent);
         let lit = |x: S| S::select(wo.z.gt(S::zero()), x * S::c(0.5 * FRAC_1_PI), S::zero());
         let place = S::c(place(f64::from(params.exponent)));
@@ -139,13 +139,13 @@ impl<S: Real> Lobe<S> for Phong<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::lift(self.scale) * self.power(wi); 3]
     }
 
     /// What falls below the surface is no direction at all.
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         L::lift(self.density) * self.power(wi)
     }
 
@@ -162,12 +162,12 @@ impl<S: Real> Lobe<S> for Phong<S> {
         V3::new(w.x, w.y, w.z.max(S::zero()))
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.view(w, self.place); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [curve.bound(w, L::lift(self.place)).min(L::one()); 3]
     }
 }

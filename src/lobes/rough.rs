@@ -11,7 +11,7 @@ use super::registry::LobeSpec;
 use crate::albedo::facets::{FacetKey, FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Real, V3, fresnel, sampling};
+use crate::optics::{Lift, Over, Real, V3, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// The distributions a script may name.
@@ -119,15 +119,13 @@ impl<S: Real> Reflectance<S> {
 
     /// At the cosine `c` between direction and facet; `fall` is 1 − c with all its digits.
     #[inline(always)]
-    pub(super) fn at<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
+    pub(super) fn at<L: Over<S>>(&self, c: L, fall: L) -> Rgb<L> {
         match self {
             Reflectance::White => [L::one(); 3],
-            Reflectance::Conductor(n, k) => {
-                std::array::from_fn(|i| fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c))
-            }
+            Reflectance::Conductor(n, k) => rgb!(i => fresnel::conductor(L::lift(n[i]), L::lift(k[i]), c)),
             Reflectance::Coated(n, k, film) => {
                 // Phases of many turns, and roots next to the critical angle: in double precision.
-                let values = [n[0], n[1], n[2], k[0], k[1], k[2], film.thickness, film.ior].map(L::lift);
+                let values = lifted([n[0], n[1], n[2], k[0], k[1], k[2], film.thickness, film.ior]);
                 let [n0, n1, n2, k0, k1, k2, thickness, ior] = values;
                 L::by_lane([n0, n1, n2, k0, k1, k2, thickness, ior, c], |v| {
                     let film = Film { thickness: v[6], ior: v[7] };
@@ -136,17 +134,22 @@ impl<S: Real> Reflectance<S> {
             }
             Reflectance::Schlick(f0, f90, exponent) => {
                 let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
-                std::array::from_fn(|i| (L::lift(f90[i]) - L::lift(f0[i])).mul_add(weight, L::lift(f0[i])))
+                rgb!(i => (L::lift(f90[i]) - L::lift(f0[i])).mul_add(weight, L::lift(f0[i])))
             }
         }
     }
 
     /// 1 − F, of Schlick's curve with all its digits where F is close to 1.
     #[inline(always)]
-    pub(super) fn rest<L: Real + Lift<S>>(&self, c: L, fall: L) -> Rgb<L> {
-        let Reflectance::Schlick(f0, f90, exponent) = self else { return self.at(c, fall).map(|f| L::one() - f) };
+    pub(super) fn rest<L: Over<S>>(&self, c: L, fall: L) -> Rgb<L> {
+        let Reflectance::Schlick(f0, f90, exponent) = self else {
+            return {
+                let f = self.at(c, fall);
+                rgb!(i => L::one() - f[i])
+            };
+        };
         let weight = fall.clamp(L::zero(), L::one()).powf(L::lift(*exponent));
-        std::array::from_fn(|i| {
+        rgb!(i => {
             let (f0, f90) = (L::lift(f0[i]), L::lift(f90[i]));
             (f0 - f90).mul_add(weight, L::one() - f0).max(L::zero())
         })
@@ -158,7 +161,7 @@ impl<S: Real> Reflectance<S> {
             Reflectance::White => [S::one(); 3],
             Reflectance::Schlick(f0, f90, p) => {
                 let share = S::c(2.0) / ((*p + S::one()) * (*p + S::c(2.0)));
-                std::array::from_fn(|i| (f90[i] - f0[i]).mul_add(share, f0[i]))
+                rgb!(i => (f90[i] - f0[i]).mul_add(share, f0[i]))
             }
             Reflectance::Conductor(..) | Reflectance::Coated(..) => {
                 const POINTS: [(f64, f64); 4] = [
@@ -203,7 +206,7 @@ impl<S: Real> Reflector<S> {
         alpha: [f32; 2],
         reflectance: Reflectance<S>,
         wo: V3<S>,
-        tables: &FacetTables<S>,
+        tables: &FacetTables<S::Entry>,
     ) -> Self {
         let alpha = widths(alpha).map(S::from_f32);
         let facets = Facets::new(shape, alpha);
@@ -228,7 +231,7 @@ impl<S: Real> Reflector<S> {
     }
 
     #[inline(always)]
-    pub(super) fn f<L: Real + Lift<S>>(&self, wi: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         let wo = V3::<L>::lift(self.wo);
         let h = wo + wi;
         let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
@@ -239,14 +242,14 @@ impl<S: Real> Reflector<S> {
         let part = self.reflectance.at(c, fall);
         let missing = tables.missing(wi, self.facets.alpha());
         let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let f = part[c].mul_add(single, L::lift(self.again[c]) * missing);
             L::select(lit, f, L::zero())
         })
     }
 
     #[inline(always)]
-    pub(super) fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let wo = V3::<L>::lift(self.wo);
         let facet = self.facets.mirrored_pdf(wo + wi, wo.z, L::lift(self.proposal));
         let even = L::lift(self.even);
@@ -262,21 +265,21 @@ impl<S: Real> Reflector<S> {
     }
 
     /// Best estimate of the albedo.
-    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S>) -> Rgb<S> {
+    pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S::Entry>) -> Rgb<S> {
         self.total(w, tables, tables.view(w))
     }
 
     /// Never below the albedo.
     #[inline(always)]
-    pub(super) fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>) -> Rgb<L> {
+    pub(super) fn albedo_bound<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         self.total(w, tables, tables.bound(w))
     }
 
     #[inline(always)]
-    fn total<L: Real + Lift<S>>(&self, w: V3<L>, tables: &FacetTables<S>, parts: [L; PARTS]) -> Rgb<L> {
+    fn total<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>, parts: [L; PARTS]) -> Rgb<L> {
         let missing = tables.missing(w, self.facets.alpha());
         let white = matches!(self.reflectance, Reflectance::White);
-        std::array::from_fn(|c| {
+        rgb!(c => {
             // Without parts: all that is not missing, which no reflectance exceeds.
             let single = if white || !tables.has_parts() { L::one() - missing } else { parts[c] };
             // A part that is next to nothing may have been rounded below it.

@@ -20,7 +20,7 @@ use super::rough::{
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3, rgb};
 
 closure! {
     /// Reflection with a color facing and a color grazing, and refraction of the rest if it has a tint; what bounces between
@@ -166,7 +166,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
         transmits(params.transmission_tint)
     }
 
-    fn new(params: &GeneralizedSchlickParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &GeneralizedSchlickParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let shape = DISTRIBUTIONS[params.distribution as usize];
         let [f0, f90] = [params.f0, params.f90].map(|f| f.map(S::from_f32));
         let film = [params.thinfilm_thickness, params.thinfilm_ior];
@@ -186,7 +186,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Coat(surface, tint) => tinted(tint, surface.f(wi, curve.facets())),
             Glass(surface) => surface.f(wi, curve.facets()),
@@ -194,7 +194,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Coat(surface, _) => surface.pdf(wi),
             Glass(surface) => surface.pdf(wi),
@@ -208,7 +208,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
         }
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
             Coat(surface, tint) => tinted(tint, surface.albedo(w, curve.facets())),
             Glass(surface) => surface.albedo(w, curve.facets()),
@@ -216,14 +216,15 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
             Coat(surface, tint) => tinted(tint, surface.albedo_bound(w, curve.facets())),
             Glass(surface) => surface.albedo_bound(w, curve.facets()),
         }
     }
 
-    fn relative_eta<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
             Coat(..) => L::one(),
             Glass(surface) => surface.relative_eta(wi),
@@ -232,6 +233,6 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
 }
 
 #[inline(always)]
-fn tinted<S: Real, L: Real + Lift<S>>(tint: &Rgb<S>, color: Rgb<L>) -> Rgb<L> {
-    std::array::from_fn(|c| L::lift(tint[c]) * color[c])
+fn tinted<S: Real, L: Over<S>>(tint: &Rgb<S>, color: Rgb<L>) -> Rgb<L> {
+    rgb!(c => L::lift(tint[c]) * color[c])
 }

@@ -26,14 +26,13 @@
 //! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
-use super::lanes::{each_lane, each_lane_of};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb};
 use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{F32x8, Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, Scalar, V3};
 
 closure! {
     /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
@@ -198,16 +197,22 @@ struct FittedFor<S> {
 impl<S: Real> FittedFor<S> {
     /// Λ toward the viewer, which is never softened.
     #[inline(always)]
-    fn lambda_o(&self, wo: V3<S>, known: Known<'_, S>) -> S {
+    fn lambda_o(&self, wo: V3<S>, known: Known<'_, S::Entry>) -> S {
         let cos = fitted_cosine(wo);
-        charlie::read_lambda(known.lambda_o, cos).unwrap_or_else(|| self.fit.lambda(cos, S::zero()))
+        match charlie::read_lambda(known.lambda_o, cos) {
+            Some(lambda) => lambda,
+            None => self.fit.lambda(cos, S::zero()),
+        }
     }
 
     /// Λ toward a light.
     #[inline(always)]
-    fn lambda_i<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+    fn lambda_i<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let cos = fitted_cosine(wi);
-        charlie::read_softened(known.lambda_i, cos).unwrap_or_else(|| self.fit.lambda(cos, self.soften))
+        match charlie::read_softened(known.lambda_i, cos) {
+            Some(lambda) => lambda,
+            None => self.fit.lambda(cos, self.soften),
+        }
     }
 }
 
@@ -242,7 +247,7 @@ pub struct Sheen<S> {
 }
 
 impl<S: Real> Sheen<S> {
-    fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: Known<'_, S>) -> Self {
+    fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: Known<'_, S::Entry>) -> Self {
         let r = roughness.clamp(S::c(variant.floor()), S::one());
         let fitted = |fit: FittedLambda<S>, soften: f64| {
             let (lambda_o, scale) = (S::one(), S::one());
@@ -267,7 +272,7 @@ impl<S: Real> Sheen<S> {
 
     /// Turned toward ωo, where its transformed cosine has the parameters `params`.
     #[inline(always)]
-    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S>) -> Self {
+    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S::Entry>) -> Self {
         let [a, b, c, share] = params;
         let mut uniform = share;
         let shadowing = match self.shadowing {
@@ -290,16 +295,22 @@ impl<S: Real> Sheen<S> {
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+    fn value<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         match self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi, self.d(wi, known), fitted.lambda_i(wi, known)),
+            _ if L::WIDE => self.value_of_any(wi, known),
             _ => self.value_apart(wi, known),
         }
     }
 
     /// Apart, so that the default model stays short.
     #[inline(never)]
-    fn value_apart<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+    fn value_apart<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
+        self.value_of_any(wi, known)
+    }
+
+    #[inline(always)]
+    fn value_of_any<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let d = self.d(wi, known);
         match self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi, d, fitted.lambda_i(wi, known)),
@@ -311,26 +322,28 @@ impl<S: Real> Sheen<S> {
 
     /// D over ωo and ωi.
     #[inline(always)]
-    fn d<L: Real + Lift<S>>(&self, wi: V3<L>, known: Known<'_, S>) -> L {
+    fn d<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let wo = V3::<L>::lift(self.wo);
-        charlie::read_d(known.powers, charlie::half_sin2(wo, wi))
-            .unwrap_or_else(|| self.fibres.d(charlie::half_cot2(wo, wi)))
+        match charlie::read_d(known.powers, charlie::half_sin2(wo, wi)) {
+            Some(d) => d,
+            None => self.fibres.d(charlie::half_cot2(wo, wi)),
+        }
     }
 
     /// `f` where both directions lie above the surface, else 0.
     #[inline(always)]
-    fn above<L: Real + Lift<S>>(&self, wi: V3<L>, f: L) -> L {
+    fn above<L: Over<S>>(&self, wi: V3<L>, f: L) -> L {
         L::select(L::lift(self.wo.z).gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
     }
 
     #[inline(always)]
-    fn fitted<L: Real + Lift<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
+    fn fitted<L: Over<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
         let FittedFor { lambda_o, scale, .. } = fitted;
         self.above(wi, d * L::lift(scale) / (fitted_cosine(wi) * (L::lift(lambda_o) + lambda_i)))
     }
 
     #[inline(always)]
-    fn exact<L: Real + Lift<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, d: L, terms: &[S]) -> L {
+    fn exact<L: Over<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, d: L, terms: &[S::Entry]) -> L {
         // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
         let cos_o = L::lift(self.wo.z);
         let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
@@ -339,18 +352,18 @@ impl<S: Real> Sheen<S> {
     }
 
     #[inline(always)]
-    fn visible<L: Real + Lift<S>>(&self, wi: V3<L>, d: L) -> L {
+    fn visible<L: Over<S>>(&self, wi: V3<L>, d: L) -> L {
         self.above(wi, d * visibility(L::lift(self.wo.z), wi.z))
     }
 
     #[inline(always)]
-    fn transformed<L: Real + Lift<S>>(&self, albedo: S, wi: V3<L>) -> L {
+    fn transformed<L: Over<S>>(&self, albedo: S, wi: V3<L>) -> L {
         self.above(wi, L::lift(albedo) * self.ltc.density_over_cos(wi))
     }
 
     /// A value divided by what the lobe would gain at either direction.
     #[inline(always)]
-    fn kept<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>, value: L) -> Rgb<L> {
+    fn kept<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, value: L) -> Rgb<L> {
         if curve.divides() {
             let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
             [value / excess; 3]
@@ -398,23 +411,23 @@ impl<S: Real> Sheen<S> {
 
 /// What [`Sheen::extra`] gave; each may be empty.
 #[derive(Clone, Copy)]
-struct Known<'a, S> {
+struct Known<'a, E> {
     /// The coefficients of the exact Λ, where it may be asked for.
-    terms: &'a [S],
+    terms: &'a [E],
     /// Of a lobe that is all known: its row of the transformed cosines, …
-    row: &'a [S],
+    row: &'a [E],
     /// … the cubics of D, …
-    powers: &'a [S],
+    powers: &'a [E],
     /// … and those of its fitted Λ, toward the viewer and toward a light.
-    lambda_o: &'a [S],
-    lambda_i: &'a [S],
+    lambda_o: &'a [E],
+    lambda_i: &'a [E],
 }
 
 const NOTHING: Known<'static, f64> = Known { terms: &[], row: &[], powers: &[], lambda_o: &[], lambda_i: &[] };
 
-impl<'a, S: Real> Known<'a, S> {
+impl<'a, E: Scalar> Known<'a, E> {
     #[inline(always)]
-    fn of(curve: &'a AlbedoCurve<S>) -> Self {
+    fn of(curve: &'a AlbedoCurve<E>) -> Self {
         let [terms, row, powers, lambda_o, lambda_i] = curve.extra();
         Known { terms, row, powers, lambda_o, lambda_i }
     }
@@ -486,14 +499,14 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         Variant::of(params.mode, params.model, params.softening).reciprocal()
     }
 
-    fn new(params: &SheenParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &SheenParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let variant = Variant::of(params.mode, params.model, params.softening);
         let lobe = Sheen::prepare(variant, S::from_f32(params.roughness), wo, Known::of(curve));
         Sheen { excess: curve.excess(wo, lobe.roughness), ..lobe }
     }
 
     #[inline(always)]
-    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S>) -> Option<Self> {
+    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
         let (known, excess) = (Known::of(curve), curve.excess(wo, self.roughness));
         match known.row {
             [] => None,
@@ -502,35 +515,12 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.kept(wi, curve, self.value(wi, Known::of(curve)))
     }
 
     #[inline(always)]
-    fn f_lanes(&self, wi: &V3<F32x8>, curve: &AlbedoCurve<S>) -> Rgb<F32x8>
-    where
-        f32: Lift<S>,
-        F32x8: Lift<S>,
-    {
-        // Apart, because it reads tables.
-        let known = Known::of(curve);
-        let d = self.d::<F32x8>(*wi, known);
-        let value = match self.shadowing {
-            Shadowing::Fitted(fitted) => {
-                let lambda = fitted.lambda_i::<F32x8>(*wi, known);
-                each_lane_of(wi, [d, lambda], |w, [d, lambda]| self.fitted(fitted, w, d, lambda))
-            }
-            Shadowing::Exact { exact, cos_lambda_o } => {
-                each_lane_of(wi, [d], |w, [d]| self.exact(exact, cos_lambda_o, w, d, known.terms))
-            }
-            Shadowing::Visibility => each_lane_of(wi, [d], |w, [d]| self.visible(w, d)),
-            Shadowing::Transformed { albedo } => each_lane(wi, |w| self.transformed(albedo, w)),
-        };
-        self.kept(*wi, curve, value)
-    }
-
-    #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.ltc.pdf(wi)
     }
 
@@ -539,16 +529,16 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     #[inline(always)]
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
     }
 
-    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.view_bound(w, self.roughness); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let bound = curve.bound(w, L::lift(self.roughness));
         // E_light integrates over the kinks of the fitted table, which the baking resolves to 1e-4 only.
         let slack = if matches!(self.shadowing, Shadowing::Transformed { .. }) { 2e-4 } else { 0.0 };

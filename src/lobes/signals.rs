@@ -7,7 +7,7 @@ use super::registry::{ClosureParams, closure};
 use super::tags::{self, MAX_TAGS};
 use super::{AnyLobe, Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Over, Real, V3};
 use std::marker::PhantomData;
 
 closure! {
@@ -99,15 +99,17 @@ impl<S: Real, P: SignalParams> Lobe<S> for Silent<S, P> {
         Some(Limits { lowest: 0.0, highest: 0.0 })
     }
 
-    fn new(params: &P, _: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &P, _: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Silent { tag: params.tag(), params: PhantomData }
     }
 
-    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, _: V3<L>) -> L {
         L::zero()
     }
 
@@ -115,11 +117,12 @@ impl<S: Real, P: SignalParams> Lobe<S> for Silent<S, P> {
         V3::new(S::zero(), S::zero(), S::one())
     }
 
-    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::zero(); 3]
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 }

@@ -6,7 +6,7 @@ use super::interface::index;
 use super::registry::{Build, ClosureParams, Form, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, fresnel};
+use crate::optics::{Lift, Over, Real, V3, fresnel};
 
 closure! {
     /// Mirror reflection, a delta lobe. Without an index all light is reflected, on the normal's side; with one what a
@@ -48,7 +48,8 @@ pub(super) const FORMS: &[Form] = &[Form {
 }];
 
 /// What a smooth dielectric reflects from the side `w` is on.
-fn reflected<S: Real, L: Real + Lift<S>>(eta: S, w: V3<L>) -> L {
+#[inline(always)]
+fn reflected<S: Real, L: Over<S>>(eta: S, w: V3<L>) -> L {
     let eta = L::lift(eta);
     let far = L::select(w.z.gt(L::zero()), eta, L::one() / eta);
     let f = fresnel::dielectric((far - L::one()) * (far + L::one()), w.z.abs());
@@ -64,7 +65,8 @@ pub struct Reflection<S> {
 }
 
 impl<S: Real> Reflection<S> {
-    fn part<L: Real + Lift<S>>(&self, w: V3<L>) -> Rgb<L> {
+    #[inline(always)]
+    fn part<L: Over<S>>(&self, w: V3<L>) -> Rgb<L> {
         let part = if self.mirror { L::select(w.z.gt(L::zero()), L::one(), L::zero()) } else { reflected(self.eta, w) };
         [part; 3]
     }
@@ -81,15 +83,17 @@ impl<S: Real> Lobe<S> for Reflection<S> {
         params.eta > 0.0
     }
 
-    fn new(params: &ReflectionParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &ReflectionParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Reflection { wo, eta: S::c(index(params.eta)), mirror: params.eta <= 0.0 }
     }
 
-    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, _: V3<L>) -> L {
         L::zero()
     }
 
@@ -97,11 +101,12 @@ impl<S: Real> Lobe<S> for Reflection<S> {
         V3::new(-self.wo.x, -self.wo.y, self.wo.z)
     }
 
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.part(w)
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         self.part(w)
     }
 
@@ -118,7 +123,8 @@ pub struct Refraction<S> {
 }
 
 impl<S: Real> Refraction<S> {
-    fn part<L: Real + Lift<S>>(&self, w: V3<L>) -> Rgb<L> {
+    #[inline(always)]
+    fn part<L: Over<S>>(&self, w: V3<L>) -> Rgb<L> {
         let part = L::one() - reflected(self.eta, w);
         [L::select(w.z.abs().gt(L::zero()), part, L::zero()); 3]
     }
@@ -139,15 +145,17 @@ impl<S: Real> Lobe<S> for Refraction<S> {
         true
     }
 
-    fn new(params: &RefractionParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &RefractionParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Refraction { wo, eta: S::c(index(params.eta)) }
     }
 
-    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, _: V3<L>) -> L {
         L::zero()
     }
 
@@ -159,18 +167,20 @@ impl<S: Real> Lobe<S> for Refraction<S> {
         V3::new(x, y, S::select(outside, -cos, cos))
     }
 
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         self.part(w)
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         // Toward grazing the way back through the other medium keeps only half the digits of the cosine.
         let cos = w.z.mul_add(w.z, L::c(4e-6)).sqrt().copysign(w.z);
         let part = self.part(V3::new(w.x, w.y, cos))[0];
         [L::select(w.z.abs().gt(L::zero()), part, L::zero()); 3]
     }
 
-    fn relative_eta<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn relative_eta<L: Over<S>>(&self, _: V3<L>) -> L {
         let inv = S::select(self.wo.z.gt(S::zero()), S::one() / self.eta, self.eta);
         L::lift(inv)
     }

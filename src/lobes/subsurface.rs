@@ -7,7 +7,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb, Rgb32};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 
 closure! {
     /// Scattering below the surface, drawn as `albedo * diffuse(N)` unless the renderer takes it over: soft shadows and
@@ -112,17 +112,19 @@ impl<S: Real> Lobe<S> for Subsurface<S> {
         params.albedo
     }
 
-    fn new(params: &SubsurfaceParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &SubsurfaceParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let SubsurfaceParams { radius, anisotropy, ior, .. } = *params;
         let value = S::select(wo.z.gt(S::zero()), S::c(std::f64::consts::FRAC_1_PI), S::zero());
         Subsurface { value, radius, anisotropy, ior }
     }
 
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::select(wi.z.gt(L::zero()), L::lift(self.value), L::zero()); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(wi.z)
     }
 
@@ -130,11 +132,12 @@ impl<S: Real> Lobe<S> for Subsurface<S> {
         sampling::cosine_hemisphere(u)
     }
 
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::select(w.z.gt(S::zero()), S::one(), S::zero()); 3]
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::select(w.z.gt(L::zero()), L::one(), L::zero()); 3]
     }
 }

@@ -18,7 +18,7 @@ use super::limits::{self, Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, lifted, rgb, sampling};
 use std::f64::consts::PI;
 
 closure! {
@@ -93,14 +93,14 @@ fn range(index: usize) -> (f64, f64) {
 impl<S: Real> Thread<S> {
     /// The albedos' weights in one channel.
     #[inline(always)]
-    fn mix<L: Real + Lift<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
+    fn mix<L: Over<S>>(&self, parts: [L; COMPONENTS], channel: usize) -> L {
         let forward = L::lift(self.forward[channel]) * parts[FORWARD];
         L::lift(self.even[channel]).mul_add(parts[EVEN], parts[SURFACE] + forward)
     }
 
     /// A bound on the components' albedos.
     #[inline(always)]
-    fn bounds<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> [L; COMPONENTS] {
+    fn bounds<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> [L; COMPONENTS] {
         if !curve.fibre().is_empty() {
             return curve.fibre().bound(w, L::lift(self.place));
         }
@@ -172,7 +172,7 @@ impl<S: Real> Lobe<S> for Thread<S> {
         Some(Limits::above(cos, 0.0, at(kd.0).max(at(kd.1)).min(1.0)))
     }
 
-    fn new(params: &ThreadParams, wo: V3<S>, curve: &AlbedoCurve<S>) -> Self {
+    fn new(params: &ThreadParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let (zero, one, p) = (S::zero(), S::one(), params);
         let [eta, gamma_s, gamma_v, kd] = [p.eta, p.gamma_s, p.gamma_v, p.kd].map(S::from_f32);
         let o = Around::new(wo);
@@ -210,21 +210,22 @@ impl<S: Real> Lobe<S> for Thread<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let Parts { surface, forward, even } = self.cylinder.parts(Around::<L>::lift(self.o), Around::new(wi));
         let e = self.bounds(wi, curve);
         let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale), L::zero());
-        std::array::from_fn(|c| {
+        rgb!(c => {
             let excess = self.mix(e, c).max(L::lift(self.excess[c]));
             scale * self.mix([surface, forward, even], c) / excess
         })
     }
 
     /// A mixture of three: θi by each ridge with φi by its cosine, and the cosine over the hemisphere.
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let i = Around::new(wi);
         let theta = i.angle();
-        let [a, b] = self.shares.map(L::lift);
+        let [a, b] = lifted::<_, L, 2>(self.shares);
         let ridges = a * self.ridges[0].pdf(theta) + b * self.ridges[1].pdf(theta);
         let inv = L::c(0.5) / i.cos.sq().max(L::c(1e-12));
         let even = (L::one() - a - b) * L::c(1.0 / PI);
@@ -247,16 +248,16 @@ impl<S: Real> Lobe<S> for Thread<S> {
 
     /// Exact where f is not divided. Where it is, an upper estimate: E before the division over the excess at `w` alone,
     /// though each f is divided by the larger excess of its two directions.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         let e = if curve.fibre().is_empty() { self.bounds(w, curve) } else { curve.fibre().view(w, self.place) };
         let bound = self.bounds(w, curve);
-        std::array::from_fn(|c| self.mix(e, c) / self.mix(bound, c).max(S::one()))
+        rgb!(c => self.mix(e, c) / self.mix(bound, c).max(S::one()))
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let e = self.bounds(w, curve);
-        std::array::from_fn(|c| self.mix(e, c).min(L::one()))
+        rgb!(c => self.mix(e, c).min(L::one()))
     }
 }
 

@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3, sampling};
+use crate::optics::{Lift, Over, Real, V3, sampling};
 
 closure! {
     /// Lambertian transmission: f = 1/π where ωo and ωi lie on opposite sides, either way round. Albedo 1 from both.
@@ -31,7 +31,7 @@ impl<S: Real> Lobe<S> for Translucent<S> {
         Some(Limits { lowest: 1.0, highest: 1.0 })
     }
 
-    fn new(_: &TranslucentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(_: &TranslucentParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let zero = S::zero();
         let below = S::select(wo.z.lt(zero), -S::one(), zero);
         Translucent { side: S::select(wo.z.gt(zero), S::one(), below) }
@@ -41,12 +41,14 @@ impl<S: Real> Lobe<S> for Translucent<S> {
         Sides::TRANSMIT
     }
 
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let across = (wi.z * L::lift(self.side)).lt(L::zero());
         [L::select(across, L::c(std::f64::consts::FRAC_1_PI), L::zero()); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         sampling::cosine_hemisphere_pdf(-(wi.z * L::lift(self.side)))
     }
 
@@ -55,11 +57,12 @@ impl<S: Real> Lobe<S> for Translucent<S> {
         V3::new(w.x, w.y, -(w.z * self.side))
     }
 
-    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::select(w.z.abs().gt(S::zero()), S::one(), S::zero()); 3]
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::select(w.z.abs().gt(L::zero()), L::one(), L::zero()); 3]
     }
 }

@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Light passes straight through, unbent: a delta lobe in the direction −ωo that transmits everything.
@@ -27,7 +27,7 @@ impl<S: Real> Lobe<S> for Transparent<S> {
         Some(Limits { lowest: 1.0, highest: 1.0 })
     }
 
-    fn new(_: &TransparentParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(_: &TransparentParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Transparent { wo }
     }
 
@@ -39,11 +39,13 @@ impl<S: Real> Lobe<S> for Transparent<S> {
         S::zero()
     }
 
-    fn f<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn f<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::zero(); 3]
     }
 
-    fn pdf<L: Real + Lift<S>>(&self, _: V3<L>) -> L {
+    #[inline(always)]
+    fn pdf<L: Over<S>>(&self, _: V3<L>) -> L {
         L::zero()
     }
 
@@ -51,11 +53,12 @@ impl<S: Real> Lobe<S> for Transparent<S> {
         -self.wo
     }
 
-    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, _: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [S::one(); 3]
     }
 
-    fn albedo_bound<L: Real + Lift<S>>(&self, _: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    #[inline(always)]
+    fn albedo_bound<L: Over<S>>(&self, _: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [L::one(); 3]
     }
 

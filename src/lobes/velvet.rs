@@ -14,7 +14,7 @@ use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb, charlie, sheen};
 use crate::albedo::curve::no_extra;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -56,7 +56,7 @@ impl<S: Real> Velvet<S> {
     }
 
     #[inline(always)]
-    fn value<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn value<L: Over<S>>(&self, wi: V3<L>) -> L {
         let wo = V3::<L>::lift(self.wo);
         // 1/sin⁴ = (1 + cot²)²; the exponential has long vanished at the cap.
         let cot2 = charlie::half_cot2(wo, wi).min(L::c(1e6));
@@ -90,17 +90,17 @@ impl<S: Real> Lobe<S> for Velvet<S> {
         })
     }
 
-    fn new(params: &VelvetParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &VelvetParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         Velvet::prepare(S::from_f32(params.roughness), wo)
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [self.value(wi); 3]
     }
 
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.ltc.pdf(wi)
     }
 
@@ -108,12 +108,12 @@ impl<S: Real> Lobe<S> for Velvet<S> {
         self.ltc.sample(u)
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         [curve.view(w, self.roughness); 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         [curve.bound(w, L::lift(self.roughness)); 3]
     }
 }

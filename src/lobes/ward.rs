@@ -16,7 +16,7 @@ use super::{Lobe, Rgb};
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::microfacet::mirror;
-use crate::optics::{Lift, Real, V3};
+use crate::optics::{Lift, Over, Real, V3, lifted};
 use std::cell::Cell;
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, TAU};
 use std::sync::OnceLock;
@@ -137,8 +137,8 @@ fn kernel(key: &[f64; 4], wo: V3<f64>, _: &[V3<f64>], out: &mut [f64]) {
 impl<S: Real> Ward<S> {
     /// Where the deviation along the azimuth of `w` lies between the finer width and the coarser, by their ratio.
     #[inline(always)]
-    fn place<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
-        let [ax, ay] = self.alpha.map(L::lift);
+    fn place<L: Over<S>>(&self, w: V3<L>) -> L {
+        let [ax, ay] = lifted::<_, L, 2>(self.alpha);
         let (x, y) = (w.x * ax, w.y * ay);
         let across2 = w.x.mul_add(w.x, w.y * w.y).max(L::c(1e-30));
         let fine = ax.min(ay);
@@ -149,7 +149,7 @@ impl<S: Real> Ward<S> {
 
     /// H, and the exponential times 1/(π·αx·αy), 0 where nothing is reflected.
     #[inline(always)]
-    fn half<L: Real + Lift<S>>(&self, wi: V3<L>) -> (V3<L>, L) {
+    fn half<L: Over<S>>(&self, wi: V3<L>) -> (V3<L>, L) {
         let wo = V3::<L>::lift(self.wo);
         let h = wo + wi;
         let (x, y) = (h.x * L::lift(self.inverse[0]), h.y * L::lift(self.inverse[1]));
@@ -192,7 +192,7 @@ impl<S: Real> Lobe<S> for Ward<S> {
         params.ax != params.ay
     }
 
-    fn new(params: &WardParams, wo: V3<S>, _: &AlbedoCurve<S>) -> Self {
+    fn new(params: &WardParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let alpha = widths([params.ax, params.ay]).map(S::from_f32);
         let inverse = alpha.map(|a| S::one() / a);
         let scale = S::c(FRAC_1_PI) * inverse[0] * inverse[1];
@@ -200,7 +200,7 @@ impl<S: Real> Lobe<S> for Ward<S> {
     }
 
     #[inline(always)]
-    fn f<L: Real + Lift<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S>) -> Rgb<L> {
+    fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let (h, peak) = self.half(wi);
         let z2 = h.z.sq().max(L::c(1e-18));
         [h.length_squared() / z2 / z2 * peak; 3]
@@ -208,7 +208,7 @@ impl<S: Real> Lobe<S> for Ward<S> {
 
     /// Of slopes drawn as they lie: D·cos θh/(4·ωo·h). What is mirrored below the surface is no direction at all.
     #[inline(always)]
-    fn pdf<L: Real + Lift<S>>(&self, wi: V3<L>) -> L {
+    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let (h, peak) = self.half(wi);
         let z2 = h.z.sq().max(L::c(1e-18));
         // With |H| = 2·ωo·h: f·(μo + μi)/2.
@@ -223,13 +223,13 @@ impl<S: Real> Lobe<S> for Ward<S> {
         V3::new(w.x, w.y, w.z.max(S::zero()))
     }
 
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S>) -> Rgb<S> {
+    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         let lit = S::select(w.z.gt(S::zero()), S::one(), S::zero());
         [if curve.extra()[0].is_empty() { lit } else { curve.view(w, self.place(w)) }; 3]
     }
 
     #[inline(always)]
-    fn albedo_bound<L: Real + Lift<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S>) -> Rgb<L> {
+    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let lit = L::select(w.z.gt(L::zero()), L::one(), L::zero());
         [if curve.extra()[0].is_empty() { lit } else { curve.bound(w, self.place(w)).min(L::one()) }; 3]
     }

@@ -5,12 +5,41 @@
 //! multiply-add – so that results do not depend on the machine.
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+use super::avx::Avx;
+use super::lanes::{F32x8, Lanes};
+
 /// Something to run. `run` and all it calls should be `#[inline(always)]`: what is not inlined stays as narrow as the build.
 pub trait Work {
     /// What it gives.
     type Output;
     /// Does it.
     fn run(self) -> Self::Output;
+}
+
+/// Work on eight numbers at a time, in lanes to be chosen.
+pub(crate) trait LaneWork {
+    /// What it gives.
+    type Output;
+    /// Does it, in `L`. See [`Work::run`].
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// Runs `work` in the widest lanes at hand.
+#[inline]
+pub(crate) fn lanes<W: LaneWork>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<W: LaneWork>(work: W) -> W::Output {
+            work.run::<Avx>()
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has just been found to have what `avx2` is compiled for.
+            return unsafe { avx2(work) };
+        }
+    }
+    work.run::<F32x8>()
 }
 
 /// Runs `work` with the widest vectors at hand.

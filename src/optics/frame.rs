@@ -1,6 +1,6 @@
 //! Orthonormal shading frames.
 
-use super::{Lift, Real, Scalar, V3};
+use super::{Lift, Over, Real, Scalar, V3};
 
 /// An orthonormal frame: `t` and `b` span the surface, `n` is the normal, t × b = n.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,7 @@ impl<S: Scalar> Frame<S> {
 
     /// World to local.
     #[inline(always)]
-    pub fn to_local<L: Real + Lift<S>>(&self, w: V3<L>) -> V3<L> {
+    pub fn to_local<L: Over<S>>(&self, w: V3<L>) -> V3<L> {
         V3::new(V3::lift(self.t).dot(w), V3::lift(self.b).dot(w), V3::lift(self.n).dot(w))
     }
 

@@ -42,13 +42,19 @@ pub fn conductor<L: Real>(n: L, k: L, c: L) -> L {
     let a = L::select(up, large, small).safe_sqrt();
     let b2 = L::select(up, small, large).max(L::zero());
     // As squares: next to n = 1 their sums less twice the product would leave no digits.
-    let ratio = |x: L, y: L, rest: L| ((x - y).sq() + rest) / ((x + y).sq() + rest).max(L::c(1e-30));
     let (s, p) = (ratio(a, c, b2), ratio(a * c, s2, b2 * c2));
     (half * s * (L::one() + p)).clamp(L::zero(), L::one())
 }
 
+/// ((x − y)² + rest) / ((x + y)² + rest).
+#[inline(always)]
+fn ratio<L: Real>(x: L, y: L, rest: L) -> L {
+    ((x - y).sq() + rest) / ((x + y).sq() + rest).max(L::c(1e-30))
+}
+
 /// n and k of a conductor that reflects `r` (in [0, 0.99]) at normal incidence; `g` in [0, 1] tints its edge: 1 keeps
 /// the color, 0 lets it whiten late (Gulbrandsen 2014, eq. 7-9).
+#[inline(always)]
 pub fn artistic<L: Real>(r: L, g: L) -> (L, L) {
     let r = r.clamp(L::zero(), L::c(0.99));
     let g = g.clamp(L::zero(), L::one());

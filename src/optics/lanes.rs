@@ -1,6 +1,9 @@
 //! `Real` for f64, f32 and eight f32 side by side.
+//!
+//! What is read into lanes, and back, is [`Lanes`]: here for any processor, in `avx` for those with AVX2.
 
 use super::real::{Lift, Real, Scalar};
+use super::vec3::V3;
 use super::{elementary, octaves};
 use core::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, MulAssign, Neg, Not, Sub, SubAssign};
 
@@ -52,6 +55,7 @@ macro_rules! shared_scalar {
 
 impl Real for f64 {
     type Mask = bool;
+    type Entry = f64;
     shared_scalar!(f64);
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
@@ -83,10 +87,15 @@ impl Real for f64 {
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
     }
+    #[inline(always)]
+    fn gather(table: &[f64], index: f64) -> f64 {
+        table[index as usize]
+    }
 }
 
 impl Real for f32 {
     type Mask = bool;
+    type Entry = f32;
     shared_scalar!(f32);
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
@@ -117,7 +126,7 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn pick(table: &[f32], index: Self) -> Self {
-        <f32 as Lift<f32>>::gather(table, index)
+        <f32 as Real>::gather(table, index)
     }
     #[inline(always)]
     fn exp(self) -> Self {
@@ -143,6 +152,20 @@ impl Real for f32 {
     fn atan2(self, x: Self) -> Self {
         elementary::atan2(self, x)
     }
+    #[inline(always)]
+    fn gather(table: &[f32], index: f32) -> f32 {
+        // No panic in sight: a loop over this becomes vector code.
+        table.get(elementary::index(index)).copied().unwrap_or(0.0)
+    }
+    #[inline(always)]
+    fn run<const N: usize>(table: &[f32], index: f32) -> [f32; N] {
+        table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
+    }
+    #[inline(always)]
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(table: &[f32], x: f32) -> Option<f32> {
+        let (cell, t) = octaves::place::<OCTAVES, DIGITS, f32>(x);
+        Some(octaves::cubic(octaves::cubics::<CELLS>(table)?[cell as usize & (CELLS - 1)], t))
+    }
 }
 
 impl Scalar for f64 {
@@ -167,6 +190,26 @@ impl Scalar for f32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 pub struct F32x8(pub [f32; 8]);
+
+/// Eight `f32` side by side, whatever they are kept in.
+pub(crate) trait Lanes: Real<Entry = f32> + Lift<f32> {
+    /// Three columns of eight rows.
+    fn load(rows: &[[f32; 3]; 8]) -> V3<Self>;
+    /// Eight rows of four columns.
+    fn store(columns: [Self; 4]) -> [[f32; 4]; 8];
+}
+
+impl Lanes for F32x8 {
+    #[inline(always)]
+    fn load(rows: &[[f32; 3]; 8]) -> V3<Self> {
+        let column = |c: usize| F32x8(std::array::from_fn(|i| rows[i][c]));
+        V3::new(column(0), column(1), column(2))
+    }
+    #[inline(always)]
+    fn store(columns: [Self; 4]) -> [[f32; 4]; 8] {
+        std::array::from_fn(|i| columns.map(|c| c.0[i]))
+    }
+}
 
 /// One truth value per lane of [`F32x8`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,6 +295,8 @@ impl Not for Mask8 {
 
 impl Real for F32x8 {
     type Mask = Mask8;
+    type Entry = f32;
+    const WIDE: bool = true;
 
     #[inline(always)]
     fn c(x: f64) -> Self {
@@ -344,26 +389,19 @@ impl Real for F32x8 {
     }
     #[inline(always)]
     fn pick(table: &[f32], index: Self) -> Self {
-        index.map(|i| <f32 as Lift<f32>>::gather(table, i))
-    }
-}
-
-impl Lift<f32> for F32x8 {
-    #[inline(always)]
-    fn lift(s: f32) -> Self {
-        F32x8([s; 8])
+        index.map(|i| <f32 as Real>::gather(table, i))
     }
     #[inline(always)]
     fn gather(table: &[f32], index: Self) -> Self {
-        index.map(|i| <f32 as Lift<f32>>::gather(table, i))
+        index.map(|i| <f32 as Real>::gather(table, i))
     }
     /// In three loops, like [`quartic`](Self::quartic).
     #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[f32], x: Self) -> Option<Self> {
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(table: &[f32], x: Self) -> Option<Self> {
         let cubics = octaves::cubics::<CELLS>(table)?;
         let (mut cell, mut t) = ([0; 8], [0.0; 8]);
         for k in 0..8 {
-            (cell[k], t[k]) = octaves::place::<OCTAVES, DIGITS>(x.0[k]);
+            (cell[k], t[k]) = octaves::place::<OCTAVES, DIGITS, f32>(x.0[k]);
         }
         let mut read = [[0.0; 4]; 8];
         for k in 0..8 {
@@ -402,14 +440,17 @@ impl Lift<f32> for F32x8 {
     }
 }
 
+impl Lift<f32> for F32x8 {
+    #[inline(always)]
+    fn lift(s: f32) -> Self {
+        F32x8([s; 8])
+    }
+}
+
 impl Lift<F32x8> for F32x8 {
     #[inline(always)]
     fn lift(s: F32x8) -> Self {
         s
-    }
-    #[inline(always)]
-    fn gather(table: &[F32x8], index: Self) -> Self {
-        F32x8(std::array::from_fn(|i| table[index.0[i] as usize].0[i]))
     }
 }
 
@@ -418,29 +459,11 @@ impl Lift<f32> for f32 {
     fn lift(s: f32) -> Self {
         s
     }
-    #[inline(always)]
-    fn gather(table: &[f32], index: f32) -> f32 {
-        // No panic in sight: a loop over this becomes vector code.
-        table.get(elementary::index(index)).copied().unwrap_or(0.0)
-    }
-    #[inline(always)]
-    fn run<const N: usize>(table: &[f32], index: f32) -> [f32; N] {
-        table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
-    }
-    #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[f32], x: f32) -> Option<f32> {
-        let (cell, t) = octaves::place::<OCTAVES, DIGITS>(x);
-        Some(octaves::cubic(octaves::cubics::<CELLS>(table)?[cell as usize & (CELLS - 1)], t))
-    }
 }
 
 impl Lift<f64> for f64 {
     #[inline(always)]
     fn lift(s: f64) -> Self {
         s
-    }
-    #[inline(always)]
-    fn gather(table: &[f64], index: f64) -> f64 {
-        table[index as usize]
     }
 }

@@ -9,7 +9,7 @@
 //! and the density of visible facets is 2·(ω·h)·D(h)/(μ + ℓ). D takes the half vector as it comes, ωo + ωi: its x and y
 //! keep their digits where a normalised h would have lost them, so that α = 1e-4 works in single precision.
 
-use super::{Lift, Real, V3};
+use super::{Lift, Over, Real, V3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 /// The distribution of slopes.
@@ -62,7 +62,7 @@ impl<S: Real> Facets<S> {
 
     /// Density of facets with normal along `h` (any length), per solid angle and area of the surface.
     #[inline(always)]
-    pub fn d<L: Real + Lift<S>>(&self, h: V3<L>) -> L {
+    pub fn d<L: Over<S>>(&self, h: V3<L>) -> L {
         let (x, y, z2) = (h.x * L::lift(self.inverse[0]), h.y * L::lift(self.inverse[1]), h.z * h.z);
         let slope2 = x.mul_add(x, y * y);
         let length2 = h.length_squared();
@@ -81,7 +81,7 @@ impl<S: Real> Facets<S> {
 
     /// ℓ(ω) = |μ|·(1 + 2Λ(ω)) of a unit vector.
     #[inline(always)]
-    pub fn reach<L: Real + Lift<S>>(&self, w: V3<L>) -> L {
+    pub fn reach<L: Over<S>>(&self, w: V3<L>) -> L {
         let (x, y) = (w.x * L::lift(self.alpha[0]), w.y * L::lift(self.alpha[1]));
         let s2 = x.mul_add(x, y * y);
         match self.shape {
@@ -122,7 +122,7 @@ impl<S: Real> Facets<S> {
     /// Of [`visible`](Self::visible), density per solid angle of the mirrored direction: D/(2(μo + ℓo)); `reach_o` is
     /// the proposal's ℓ(ωo).
     #[inline(always)]
-    pub fn mirrored_pdf<L: Real + Lift<S>>(&self, h: V3<L>, cos_o: L, reach_o: L) -> L {
+    pub fn mirrored_pdf<L: Over<S>>(&self, h: V3<L>, cos_o: L, reach_o: L) -> L {
         self.proposal().d(h) * L::c(0.5) / (cos_o + reach_o).max(L::c(1e-18))
     }
 }

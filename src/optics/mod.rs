@@ -1,5 +1,7 @@
 //! Numbers, vectors, frames, sampling and surface optics: what lobe maths stands on. Knows no lobe.
 
+#[cfg(target_arch = "x86_64")]
+mod avx;
 pub mod dispatch;
 pub mod elementary;
 pub mod film;
@@ -14,5 +16,7 @@ pub mod vec3;
 
 pub use frame::Frame;
 pub use lanes::F32x8;
-pub use real::{Lift, Real, Scalar};
+pub(crate) use lanes::Lanes;
+pub(crate) use real::rgb;
+pub use real::{Lift, Over, Real, Scalar, array, lifted};
 pub use vec3::V3;

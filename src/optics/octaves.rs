@@ -7,6 +7,9 @@
 //! x^p, p a few, and with the rounding of single precision within 2e-7 more: as good as the function is there. For
 //! single precision alone.
 
+use super::elementary::{Bits, Single};
+use super::real::Real;
+
 /// The lowest number that has a cell of its own, as bits.
 const fn lowest(octaves: u32) -> u32 {
     (127 - octaves) << 23
@@ -23,26 +26,30 @@ pub fn cubics<const CELLS: usize>(table: &[f32]) -> Option<&[[f32; 4]; CELLS]> {
 
 /// The cell of `x`, |x| ≤ 1, and where it lies in it, in [−1, 1].
 #[inline(always)]
-pub fn place<const OCTAVES: u32, const DIGITS: u32>(x: f32) -> (u32, f32) {
-    let low = f32::from_bits(lowest(OCTAVES));
-    let size = if x.abs() > low { x.abs() } else { low };
+pub fn place<const OCTAVES: u32, const DIGITS: i32, R: Single>(x: R) -> (R::Bits, R) {
+    let (low, word) = (lowest(OCTAVES), R::Bits::of);
+    let size = x.abs().max(R::from_f32(f32::from_bits(low)));
     // 1 itself is read at the end of the last cell.
-    let bits = if size < HIGHEST { size } else { HIGHEST }.to_bits();
-    let half = (x.to_bits() >> 31) * (OCTAVES << DIGITS);
-    let cell = ((bits - lowest(OCTAVES)) >> (23 - DIGITS)) + half;
+    let bits = size.min(R::from_f32(HIGHEST)).to_bits();
+    // 23 − `DIGITS` bits lie below a cell's.
+    let cell = match DIGITS {
+        3 => bits.minus(word(low)).down::<20>(),
+        _ => bits.minus(word(low)).down::<19>(),
+    };
+    let half = x.to_bits().down_signed::<31>().and(word(OCTAVES << DIGITS));
     // The digits below the cell's, as a number in [1, 2).
-    let rest = f32::from_bits(((bits << DIGITS) & 0x007f_ffff) | 0x3f80_0000);
-    (cell, rest * 2.0 - 3.0)
+    let rest = R::from_bits(bits.up::<DIGITS>().and(word(0x007f_ffff)).or(word(0x3f80_0000)));
+    (cell.plus(half), rest * R::from_f32(2.0) - R::from_f32(3.0))
 }
 
 /// a + b·t + c·t² + d·t³.
 #[inline(always)]
-pub fn cubic([a, b, c, d]: [f32; 4], t: f32) -> f32 {
+pub fn cubic<R: Real>([a, b, c, d]: [R; 4], t: R) -> R {
     (d * t + c) * (t * t) + (b * t + a)
 }
 
 /// The cubics of `f` over (0, 1), four coefficients per cell, through its values at Chebyshev's nodes.
-pub fn fit<const OCTAVES: u32, const DIGITS: u32>(f: impl Fn(f64) -> f64) -> Vec<f64> {
+pub fn fit<const OCTAVES: u32, const DIGITS: i32>(f: impl Fn(f64) -> f64) -> Vec<f64> {
     let node = |k: usize| ((2 * k + 1) as f64 * std::f64::consts::PI / 8.0).cos();
     let cells = (0..OCTAVES << DIGITS).map(|cell| {
         let (octave, part) = (cell >> DIGITS, cell & ((1 << DIGITS) - 1));
@@ -64,10 +71,10 @@ pub fn fit<const OCTAVES: u32, const DIGITS: u32>(f: impl Fn(f64) -> f64) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::{F32x8, Lift};
+    use crate::optics::{F32x8, Real};
 
     fn read<const CELLS: usize>(table: &[f32], x: f32) -> f32 {
-        let value = <f32 as Lift<f32>>::octaves::<32, 4, CELLS>(table, x).expect("a table");
+        let value = <f32 as Real>::octaves::<32, 4, CELLS>(table, x).expect("a table");
         let lanes = F32x8::octaves::<32, 4, CELLS>(table, F32x8([x; 8])).expect("a table");
         assert_eq!(lanes.0, [value; 8]);
         value
@@ -94,8 +101,8 @@ mod tests {
     #[test]
     fn whatever_is_looked_up_there_is_a_number() {
         let table: Vec<f32> = fit::<32, 4>(f64::sqrt).into_iter().map(|c| c as f32).collect();
-        assert!(<f32 as Lift<f32>>::octaves::<32, 4, 512>(&[], 0.5).is_none());
-        assert!(<f32 as Lift<f32>>::octaves::<32, 4, 1024>(&table, 0.5).is_none());
+        assert!(<f32 as Real>::octaves::<32, 4, 512>(&[], 0.5).is_none());
+        assert!(<f32 as Real>::octaves::<32, 4, 1024>(&table, 0.5).is_none());
         for odd in [0.0, -0.0, -1.0, f32::NAN, 1.0, 2.0, f32::INFINITY, f32::NEG_INFINITY, f32::MIN_POSITIVE] {
             assert!(read::<512>(&table, odd).is_finite(), "{odd}");
         }

@@ -16,6 +16,7 @@ pub trait Real:
     + Sync
     + 'static
     + Lift<Self>
+    + Lift<Self::Entry>
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -27,6 +28,12 @@ pub trait Real:
 {
     /// The outcome of a comparison, one truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask> + Not<Output = Self::Mask>;
+
+    /// What tables hold that are read in this type: a single number.
+    type Entry: Scalar;
+
+    /// Whether it is several numbers. What is called, not inlined, is not compiled for the vectors they are kept in.
+    const WIDE: bool = false;
 
     /// A constant, rounded to this type.
     fn c(x: f64) -> Self;
@@ -46,6 +53,7 @@ pub trait Real:
     /// The next whole number below.
     fn floor(self) -> Self;
     /// [`floor`](Self::floor) of a number in [0, 2²²], for less: the cell of a table.
+    #[inline(always)]
     fn whole(self) -> Self {
         self.floor()
     }
@@ -67,10 +75,12 @@ pub trait Real:
     /// self ≤ o.
     fn le(self, o: Self) -> Self::Mask;
     /// self > o.
+    #[inline(always)]
     fn gt(self, o: Self) -> Self::Mask {
         o.lt(self)
     }
     /// self ≥ o.
+    #[inline(always)]
     fn ge(self, o: Self) -> Self::Mask {
         o.le(self)
     }
@@ -78,10 +88,12 @@ pub trait Real:
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
 
     /// xʸ for x ≥ 0, as exp(y·ln x) in one base or another. 0⁰ = 1.
+    #[inline(always)]
     fn powf(self, y: Self) -> Self {
         (y * self.ln()).exp()
     }
     /// ln(1 + x) for x ≥ 0, precise for small x too.
+    #[inline(always)]
     fn ln_1p(self) -> Self {
         // Kahan: the rounding of 1 + x is divided out again.
         let u = Self::one() + self;
@@ -90,32 +102,74 @@ pub trait Real:
     }
     /// `table[index]` of a committed table; `index` holds whole numbers inside it.
     fn pick(table: &[f32], index: Self) -> Self;
+    /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
+    fn gather(table: &[Self::Entry], index: Self) -> Self;
+
+    /// `N` entries of `table` from `index` on; see [`gather`](Self::gather).
+    #[inline(always)]
+    fn run<const N: usize>(table: &[Self::Entry], index: Self) -> [Self; N] {
+        array(|k| Self::gather(table, index + Self::c(k as f64)))
+    }
+
+    /// A table of `CELLS` cubics, 2^`DIGITS` to each of `OCTAVES` octaves below 1, at `x`, |x| ≤ 1; those for negative
+    /// numbers come after those for positive ones. `None` if the table is none of this kind, or if the type has more digits
+    /// than cubics of single precision.
+    #[inline(always)]
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(
+        table: &[Self::Entry],
+        x: Self,
+    ) -> Option<Self> {
+        let _ = (table, x);
+        None
+    }
+
+    /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
+    #[inline(always)]
+    fn quartic(table: &[Self::Entry], cells: Self::Entry, x: Self) -> Self {
+        let cells = <Self as Lift<Self::Entry>>::lift(cells);
+        let place = x.clamp(Self::zero(), Self::one()).sqrt().sqrt() * cells;
+        let i = place.whole().min(cells - Self::one());
+        Self::select(x.gt(Self::zero()), Self::between(table, i, place - i), Self::zero())
+    }
+
+    /// `table` at `at` + `t`, linearly: `at` a whole number below the last place, `t` in [0, 1].
+    #[inline(always)]
+    fn between(table: &[Self::Entry], at: Self, t: Self) -> Self {
+        let [a, b] = Self::run(table, at);
+        (b - a).mul_add(t, a)
+    }
+
     /// Applies a function of doubles lane by lane: for formulas that come from outside.
     fn by_lane<const N: usize>(values: [Self; N], f: impl Fn([f64; N]) -> [f64; 3]) -> [Self; 3];
     /// x² .
+    #[inline(always)]
     fn sq(self) -> Self {
         self * self
     }
     /// `self` limited to `[lo, hi]`; NaN becomes `lo`.
+    #[inline(always)]
     fn clamp(self, lo: Self, hi: Self) -> Self {
         self.max(lo).min(hi)
     }
     /// Square root of a number that rounding may have pushed below zero.
+    #[inline(always)]
     fn safe_sqrt(self) -> Self {
         self.max(Self::c(0.0)).sqrt()
     }
     /// 0.
+    #[inline(always)]
     fn zero() -> Self {
         Self::c(0.0)
     }
     /// 1.
+    #[inline(always)]
     fn one() -> Self {
         Self::c(1.0)
     }
 }
 
 /// One number type for a single value, as opposed to lanes: what a BSDF is built in.
-pub trait Scalar: Real<Mask = bool> + PartialOrd + Default {
+pub trait Scalar: Real<Mask = bool, Entry = Self> + PartialOrd + Default {
     /// In double precision.
     fn to_f64(self) -> f64;
     /// In single precision.
@@ -130,37 +184,46 @@ pub trait Scalar: Real<Mask = bool> + PartialOrd + Default {
 pub trait Lift<S>: Sized {
     /// The same value in every lane.
     fn lift(s: S) -> Self;
-    /// `table[index]` per lane; `index` holds whole numbers inside the table (beyond it: some finite number).
-    fn gather(table: &[S], index: Self) -> Self;
+}
 
-    /// `N` entries of `table` from `index` on; see [`gather`](Self::gather).
-    #[inline(always)]
-    fn run<const N: usize>(table: &[S], index: Self) -> [Self; N]
-    where
-        Self: Real,
-    {
-        std::array::from_fn(|k| Self::gather(table, index + Self::c(k as f64)))
-    }
+/// What a formula is evaluated in whose lobe was prepared in `S`, with tables that both can read.
+pub trait Over<S: Real>: Real<Entry = S::Entry> + Lift<S> {}
 
-    /// A table of `CELLS` cubics, 2^`DIGITS` to each of `OCTAVES` octaves below 1, at `x`, |x| ≤ 1; those for negative
-    /// numbers come after those for positive ones. `None` if the table is none of this kind, or if the type has more digits
-    /// than cubics of single precision.
-    #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: u32, const CELLS: usize>(table: &[S], x: Self) -> Option<Self> {
-        let _ = (table, x);
-        None
-    }
+impl<S: Real, L: Real<Entry = S::Entry> + Lift<S>> Over<S> for L {}
 
-    /// A table whose entries stand for x = (k/`cells`)⁴, linearly between them; 0 where `x` is not above 0.
-    #[inline(always)]
-    fn quartic(table: &[S], cells: S, x: Self) -> Self
-    where
-        Self: Real + Lift<S>,
-    {
-        let cells = Self::lift(cells);
-        let place = x.clamp(Self::zero(), Self::one()).sqrt().sqrt() * cells;
-        let i = place.whole().min(cells - Self::one());
-        let [a, b] = Self::run(table, i);
-        Self::select(x.gt(Self::zero()), (b - a).mul_add(place - i, a), Self::zero())
+/// `f` of 0, 1, …, as an array: `std::array::from_fn` in words that leave no call behind.
+#[inline(always)]
+pub fn array<R: Real, const N: usize>(f: impl Fn(usize) -> R) -> [R; N] {
+    let mut out = [R::zero(); N];
+    for i in 0..N {
+        out[i] = f(i);
     }
+    out
+}
+
+/// Three channels: `rgb!(c => expression in c)`. No closure, because those cannot be told to be inlined.
+macro_rules! rgb {
+    ($c:ident => $e:expr) => {
+        [
+            {
+                let $c = 0usize;
+                $e
+            },
+            {
+                let $c = 1usize;
+                $e
+            },
+            {
+                let $c = 2usize;
+                $e
+            },
+        ]
+    };
+}
+pub(crate) use rgb;
+
+/// `values` brought into another type; see [`array`].
+#[inline(always)]
+pub fn lifted<S: Copy, L: Real + Lift<S>, const N: usize>(values: [S; N]) -> [L; N] {
+    array(|i| L::lift(values[i]))
 }

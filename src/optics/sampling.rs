@@ -4,6 +4,7 @@ use super::{Real, V3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 /// A direction about z with density cos θ/π.
+#[inline(always)]
 pub fn cosine_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
     let r = u[0].sqrt();
     let (s, c) = (u[1] * R::c(TAU)).sin_cos();
@@ -17,11 +18,13 @@ pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
 }
 
 /// A direction about z, uniform over the upper hemisphere.
+#[inline(always)]
 pub fn uniform_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
     V3::polar(u[0], u[1] * R::c(TAU))
 }
 
 /// [`cosine_hemisphere`] and [`uniform_hemisphere`] of the same numbers.
+#[inline(always)]
 pub(crate) fn cosine_and_uniform_hemisphere<R: Real>(u: [R; 2]) -> (V3<R>, V3<R>) {
     let (s, c) = (u[1] * R::c(TAU)).sin_cos();
     let (root, sin) = (u[0].sqrt(), (R::one() - u[0] * u[0]).safe_sqrt());
@@ -29,11 +32,13 @@ pub(crate) fn cosine_and_uniform_hemisphere<R: Real>(u: [R; 2]) -> (V3<R>, V3<R>
 }
 
 /// Density of [`uniform_hemisphere`]; 0 below the surface.
+#[inline(always)]
 pub fn uniform_hemisphere_pdf<R: Real>(cos: R) -> R {
     R::select(cos.gt(R::zero()), R::c(0.5 * FRAC_1_PI), R::zero())
 }
 
 /// Two unit vectors that stand at right angles on the unit vector `axis` and on each other (Duff et al. 2017).
+#[inline(always)]
 pub fn around<R: Real>(axis: V3<R>) -> (V3<R>, V3<R>) {
     let sign = R::one().copysign(axis.z);
     let a = -R::one() / (sign + axis.z);

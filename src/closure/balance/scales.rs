@@ -1,7 +1,7 @@
 //! The table of a solved scale, and how evaluation reads it.
 
 use crate::lobes::Rgb;
-use crate::optics::{Lift, Real, Scalar};
+use crate::optics::{Lift, Over, Real, Scalar, array};
 
 /// s over μ = x⁴ at uniform x, for a row per weight and parameter of the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,25 +51,33 @@ impl<S: Scalar> Scales<S> {
 
     /// s at `cos`, per channel.
     #[inline(always)]
-    pub fn read<L: Real + Lift<S>>(&self, row: Row<S>, cos: L) -> Rgb<L> {
+    pub fn read<L: Over<S>>(&self, row: Row<S>, cos: L) -> Rgb<L> {
         let x = cos.clamp(L::zero(), L::one()).sqrt().sqrt() * L::c((self.nodes - 1) as f64);
         let i = x.floor().min(L::c((self.nodes - 2) as f64));
         let t = x - i;
-        let along_row = |row: usize| {
-            let at = i + L::c((row * self.nodes) as f64);
-            let (a, b) = (L::gather(&self.values, at), L::gather(&self.values, at + L::one()));
-            (b - a).mul_add(t, a)
-        };
-        let over_weight = |first: usize| {
-            let a = along_row(first);
-            if self.weights == 1 { a } else { (along_row(first + 1) - a).mul_add(L::lift(row.weight), a) }
-        };
-        let channel = |c: usize| {
+        let mut channels = [L::zero(); 3];
+        for c in 0..self.channels {
             let first = c * self.weights * self.params + row.first as usize;
-            let a = over_weight(first);
-            if self.params == 1 { a } else { (over_weight(first + self.weights) - a).mul_add(L::lift(row.param), a) }
-        };
-        if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
+            let a = self.over_weight(row, first, i, t);
+            channels[c] = if self.params == 1 {
+                a
+            } else {
+                (self.over_weight(row, first + self.weights, i, t) - a).mul_add(L::lift(row.param), a)
+            };
+        }
+        if self.channels == 1 { [channels[0]; 3] } else { channels }
+    }
+
+    /// Between the rows `first` and the next by the weight; `i` and `t` are the place along them.
+    #[inline(always)]
+    fn over_weight<L: Over<S>>(&self, row: Row<S>, first: usize, i: L, t: L) -> L {
+        let start = |row: usize| i + L::c((row * self.nodes) as f64);
+        let a = L::between(&self.values, start(first), t);
+        if self.weights == 1 {
+            a
+        } else {
+            (L::between(&self.values, start(first + 1), t) - a).mul_add(L::lift(row.weight), a)
+        }
     }
 
     pub fn cast<T: Scalar>(&self) -> Scales<T> {
@@ -107,10 +115,20 @@ impl<'m, S: Scalar> Balanced<'m, S> {
         Balanced { scales, row, toward_viewer: scales.read(row, cos_o) }
     }
 
-    /// s(ωo)·s(ωi) for the cosine of ωi. Never inlined: walks without it stay short.
+    /// s(ωo)·s(ωi) for the cosine of ωi. Of a single direction apart: walks without it stay short.
+    #[inline(always)]
+    pub fn scale<L: Over<S>>(&self, cos: L) -> Rgb<L> {
+        if L::WIDE { self.product(cos) } else { self.scale_apart(cos) }
+    }
+
     #[inline(never)]
-    pub fn scale<L: Real + Lift<S>>(&self, cos: L) -> Rgb<L> {
+    fn scale_apart<L: Over<S>>(&self, cos: L) -> Rgb<L> {
+        self.product(cos)
+    }
+
+    #[inline(always)]
+    fn product<L: Over<S>>(&self, cos: L) -> Rgb<L> {
         let s = self.scales.read(self.row, cos);
-        std::array::from_fn(|c| L::lift(self.toward_viewer[c]) * s[c])
+        array(|c| L::lift(self.toward_viewer[c]) * s[c])
     }
 }
