@@ -4,10 +4,11 @@
 //! E_view. `bound` interpolates max(E_view, E_light) and is lifted by the largest shortfall measured between the
 //! nodes around each, so that it never lies below either; `view_bound` likewise, of E_view alone.
 
+use super::cells::Cells;
 use super::facets::FacetTables;
 use super::fibre::FibreTables;
 use super::quadrature::Rule;
-use crate::optics::{Lift, Over, Real, Scalar, V3, lifted};
+use crate::optics::{Over, Real, Scalar, V3, lifted};
 use std::f64::consts::PI;
 
 /// f(ωo, ωi) of an isotropic lobe for many ωi: `(key, ωo, ωi, out)`.
@@ -40,10 +41,17 @@ pub struct CurveSpec {
     pub bounded: bool,
     /// Numbers the lobe wants beside its albedos, from the key and the axis; see [`AlbedoCurve::extra`].
     pub extra: fn(&[f64; 4], Option<Axis>) -> Extra<f64>,
+    /// From the key, E_view and the bound over the cosine: what it reads in one place, where nothing varies.
+    pub cells: fn(&[f64; 4], &dyn Fn(f64) -> f64, &dyn Fn(f64) -> f64) -> Option<Cells>,
 }
 
 /// Tables of a lobe's own, beside its albedos; which is for what, the lobe knows.
-pub type Extra<S> = [Vec<S>; 5];
+pub type Extra<S> = [Vec<S>; 2];
+
+/// For [`CurveSpec::cells`]: nothing.
+pub fn no_cells(_: &[f64; 4], _: &dyn Fn(f64) -> f64, _: &dyn Fn(f64) -> f64) -> Option<Cells> {
+    None
+}
 
 /// For [`CurveSpec::extra`]: nothing.
 pub fn no_extra(_: &[f64; 4], _: Option<Axis>) -> Extra<f64> {
@@ -110,6 +118,8 @@ pub struct AlbedoCurve<S> {
     excess: Vec<S>,
     /// What [`CurveSpec::extra`] gave.
     extra: Extra<S>,
+    /// What [`CurveSpec::cells`] gave: for single precision alone.
+    cells_read: Option<Box<Cells>>,
     cos_nodes: usize,
     rows: usize,
     /// Cells over the cosine, and over the varying parameter.
@@ -135,6 +145,7 @@ where
             view_bound: vec![],
             excess: vec![],
             extra: Extra::default(),
+            cells_read: None,
             cos_nodes: 0,
             rows: 0,
             cells: [S::zero(); 2],
@@ -161,6 +172,7 @@ impl<S: Scalar> AlbedoCurve<S> {
             view_bound: all(&self.view_bound),
             excess: all(&self.excess),
             extra: self.extra.each_ref().map(|e| all(e)),
+            cells_read: self.cells_read.clone().filter(|_| T::SINGLE),
             cos_nodes: self.cos_nodes,
             rows: self.rows,
             cells: self.cells.map(|n| T::c(n.to_f64())),
@@ -210,6 +222,12 @@ impl<S: Scalar> AlbedoCurve<S> {
         &self.extra
     }
 
+    /// Whether the lobe's functions, and with them its albedos, are read in one place.
+    #[inline(always)]
+    pub fn cells(&self) -> Option<&Cells> {
+        self.cells_read.as_deref()
+    }
+
     /// The smallest E_view and the largest bound at the nodes around a range of cosines and of the varying parameter:
     /// between nodes both are interpolated, so that nothing lies outside. (0, 0) below the surface.
     pub fn range(&self, cos: (f64, f64), parameter: (f64, f64)) -> (f64, f64)
@@ -247,6 +265,7 @@ impl<S: Scalar> AlbedoCurve<S> {
     pub fn bytes(&self) -> usize {
         let own = [&self.view, &self.bound, &self.view_bound, &self.excess];
         own.into_iter().chain(&self.extra).map(Vec::len).sum::<usize>() * size_of::<S>()
+            + self.cells_read.as_ref().map_or(0, |c| c.bytes())
             + self.fibre.bytes()
             + self.facets.bytes()
     }
@@ -291,7 +310,12 @@ impl CurveSpec {
         let extra = (self.extra)(&self.key, self.axis).map(|e| e.into_iter().map(S::c).collect());
         let raw = AlbedoCurve { extra, ..self.bake_with(precision, &AlbedoCurve::default()) };
         if !self.bounded {
-            return raw;
+            let at = |cos: f64| V3::polar(S::c(cos), S::zero());
+            let view = |cos: f64| raw.view(at(cos), S::zero()).to_f64();
+            let bound = |cos: f64| raw.bound(at(cos), S::zero()).to_f64();
+            let wanted = S::SINGLE && self.axis.is_none();
+            let cells_read = if wanted { (self.cells)(&self.key, &view, &bound).map(Box::new) } else { None };
+            return AlbedoCurve { cells_read, ..raw };
         }
         // Twice: what the lobe gains by, then the lobe that is divided by it.
         let at_least_one = |e: &S| e.max(S::one());
@@ -322,6 +346,7 @@ impl CurveSpec {
             view_bound: vec![],
             excess: vec![],
             extra: Extra::default(),
+            cells_read: None,
             cos_nodes: n,
             rows,
             cells: [n, rows].map(|n| S::c((n - 1) as f64)),

@@ -12,7 +12,7 @@ use super::curve::Precision;
 use super::fill::{Estimate, fill};
 use super::quadrature::Rule;
 use super::visible::FacetQuadrature;
-use crate::optics::{Lift, Over, Real, Scalar, V3, lifted};
+use crate::optics::{Over, Real, Scalar, V3, lifted};
 use std::f64::consts::FRAC_2_PI;
 
 /// What the rows of a table go over.

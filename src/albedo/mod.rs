@@ -4,6 +4,7 @@
 //! name.
 
 mod bends;
+mod cells;
 pub mod curve;
 mod facet;
 pub mod facets;
@@ -14,6 +15,7 @@ mod panels;
 pub mod quadrature;
 mod visible;
 
+pub use cells::Cells;
 pub use curve::{AlbedoCurve, Axis, CurveSpec, Precision};
 pub use facets::{Facet, FacetKey, FacetSpec, FacetTables};
 pub use fibre::{COMPONENTS, FibreKernel, FibreKey, FibreSpec, FibreTables, HORIZON, OFFSETS, Ridges, TableSpec};

@@ -1,12 +1,21 @@
-//! Many directions at once: eight side by side, in the widest vectors at hand.
+//! Many directions at once: eight side by side, in the widest vectors at hand, and several eights per lobe.
+//!
+//! Each lobe is gone to once for up to [`BLOCKS`] eights, so that what it is and what it holds is looked up once, and one
+//! eight's arithmetic goes on while another's waits. What goes from lobe to lobe is kept per eight.
 
-use super::bsdf::{Bsdf, Eval, LayerAlpha, Op, add, finite, unit_or_zero};
+use super::bsdf::{Bsdf, Eval, FlatLobe, LayerAlpha, Op, add, finite, unit_or_zero};
+use super::flatten::Layering;
 use super::layer::{FlatStack, LayerStack, TintRule};
+use crate::albedo::AlbedoCurve;
+use crate::lobes::host::Host;
+use crate::lobes::{Evaluated, Lobe, LobeVisitor};
 use crate::optics::{F32x8, Lanes, Lift, V3, dispatch};
 
 /// How many layers may be open at once for directions to be worked on side by side.
 const DEPTH: usize = 4;
 const LANES: usize = F32x8::LANES;
+/// Eights per visit of a lobe.
+const BLOCKS: usize = 8;
 
 impl Bsdf<'_, f32> {
     /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are. Like a
@@ -36,84 +45,196 @@ impl dispatch::LaneWork for Batch<'_, '_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Batch { bsdf, wi, out } = self;
-        let mut start = 0;
+        let (mut blocks, mut starts) = ([Block::<L>::black(); BLOCKS], [0; BLOCKS]);
+        let (mut count, mut start) = (0, 0);
         while start < wi.len() {
             // The last eight may overlap those before: the same again.
             start = start.min(wi.len() - LANES);
-            let block = start..start + LANES;
-            if let (Some(wi), Some(out)) = (wi[block.clone()].first_chunk(), out[block].first_chunk_mut()) {
-                eight::<L>(bsdf, wi, out);
+            if let Some(wi) = wi[start..].first_chunk() {
+                blocks[count] = Block { wi: unit_or_zero(L::load(wi)), ..Block::black() };
+                starts[count] = start;
             }
-            start += LANES;
+            (count, start) = (count + 1, start + LANES);
+            if count == BLOCKS || start >= wi.len() {
+                evaluate(bsdf, &mut blocks[..count]);
+                for (block, start) in blocks[..count].iter().zip(starts) {
+                    if let Some(out) = out[start..].first_chunk_mut() {
+                        block.store(out);
+                    }
+                }
+                count = 0;
+            }
         }
     }
 }
 
-/// One block. There is one place where lobes are evaluated, because they are a lot of code.
+/// What goes from lobe to lobe of eight directions.
+#[derive(Clone, Copy)]
+struct Block<L> {
+    wi: V3<L>,
+    /// In the frame of the lobe.
+    local: V3<L>,
+    stack: FlatStack<L>,
+    /// What the layers above the lobe leave of it.
+    scale: L,
+    sum: [L; 4],
+}
+
+impl<L: Lanes> Block<L> {
+    #[inline(always)]
+    fn black() -> Self {
+        let nowhere = V3::new(L::zero(), L::zero(), L::zero());
+        Block { wi: nowhere, local: nowhere, stack: FlatStack::default(), scale: L::one(), sum: [L::zero(); 4] }
+    }
+
+    #[inline(always)]
+    fn store(&self, out: &mut [Eval; LANES]) {
+        let [r, g, b, pdf] = self.sum;
+        let rows = L::store([finite(r), finite(g), finite(b), pdf]);
+        for i in 0..LANES {
+            let [r, g, b, pdf] = rows[i];
+            out[i] = Eval { f_cos: [r, g, b], pdf };
+        }
+    }
+}
+
+/// Adds up every lobe.
 #[inline(always)]
-fn eight<L: Lanes>(bsdf: &Bsdf<'_>, wi: &[[f32; 3]; LANES], out: &mut [Eval; LANES]) {
-    let wi = unit_or_zero(L::load(wi));
+fn evaluate<L: Lanes>(bsdf: &Bsdf<'_>, blocks: &mut [Block<L>]) {
     let (lobes, frames, rule) = (&*bsdf.lobes, &*bsdf.frames, bsdf.layering.rule);
-    let mut deep =
-        if bsdf.is_flat() { None } else { Some(Deep { bsdf, next: 0, layer: 0, stack: LayerStack::default() }) };
-    let (mut frame, mut local) = (u32::MAX, wi);
-    let mut stack = FlatStack::<L>::default();
-    let mut sum = [L::zero(); 4];
+    let mut deep = if bsdf.is_flat() { None } else { Some(Deep::new(bsdf)) };
+    let mut frame = u32::MAX;
     for (index, l) in lobes.iter().enumerate() {
         if l.frame != frame {
             frame = l.frame;
-            local = frames[frame as usize].to_local(wi);
-        }
-        let scale = match &mut deep {
-            None => [stack.step(l.steps, rule, <L as Lift<f32>>::lift(l.alpha_o)); 3],
-            Some(deep) => deep.scale(index, &local),
-        };
-        let e = l.lobe.evaluate_lanes(local, l.curve, l.in_top);
-        add(&mut sum, l, scale, local.z, &e);
-        if l.in_top {
-            let [r, g, b, _] = l.weight_in_top;
-            match &mut deep {
-                None => stack.lobe(l.weight_in_top, e.bound),
-                Some(deep) => deep.stack.lobe([r, g, b], e.bound),
+            for block in &mut *blocks {
+                block.local = frames[frame as usize].to_local(block.wi);
             }
         }
-    }
-    let [r, g, b, pdf] = sum;
-    let rows = L::store([finite(r), finite(g), finite(b), pdf]);
-    for (out, [r, g, b, pdf]) in out.iter_mut().zip(rows) {
-        *out = Eval { f_cos: [r, g, b], pdf };
+        match &mut deep {
+            None => {
+                for block in &mut *blocks {
+                    block.scale = block.stack.step(l.steps, rule, <L as Lift<f32>>::lift(l.alpha_o));
+                }
+            }
+            Some(deep) => deep.go_on(blocks),
+        }
+        l.lobe.visit(Visit { bsdf, index, l, blocks: &mut *blocks, stacks: deep.as_mut().map(|d| &mut d.stacks) });
     }
 }
 
-/// Layers in layers, or layers that were solved for.
+/// One lobe, for all blocks.
+struct Visit<'a, 'm, L: Lanes> {
+    bsdf: &'a Bsdf<'m>,
+    index: usize,
+    l: &'a FlatLobe<'m, f32>,
+    blocks: &'a mut [Block<L>],
+    /// Of a tree that is not flat.
+    stacks: Option<&'a mut [Stack<L>; BLOCKS]>,
+}
+
+impl<L: Lanes> Visit<'_, '_, L> {
+    #[inline(always)]
+    fn add_up(self, lobe: impl Evaluate<L>) {
+        let Visit { bsdf, index, l, blocks, mut stacks } = self;
+        let balanced = bsdf.balanced.get(index).and_then(Option::as_ref);
+        for (k, block) in blocks.iter_mut().enumerate() {
+            let local = block.local;
+            let e = lobe.toward(local);
+            match balanced {
+                Some(balanced) => add(&mut block.sum, l, balanced.scale(local.z), local.z, &e),
+                // Each channel alike: the compiler is told.
+                None => add(&mut block.sum, l, [block.scale; 3], local.z, &e),
+            }
+            if l.in_top {
+                let [r, g, b, _] = l.weight_in_top;
+                match &mut stacks {
+                    None => block.stack.lobe(l.weight_in_top, e.bound),
+                    Some(stacks) => stacks[k].lobe([r, g, b], e.bound),
+                }
+            }
+        }
+    }
+}
+
+/// What a lobe gives toward a direction. No closure, because those cannot be told to be inlined.
+trait Evaluate<L> {
+    fn toward(&self, wi: V3<L>) -> Evaluated<L>;
+}
+
+/// A lobe of the list.
+struct Listed<'a, B> {
+    lobe: &'a B,
+    curve: &'a AlbedoCurve<f32>,
+    bound: bool,
+}
+
+impl<L: Lanes, B: Lobe<f32>> Evaluate<L> for Listed<'_, B> {
+    #[inline(always)]
+    fn toward(&self, wi: V3<L>) -> Evaluated<L> {
+        self.lobe.evaluate(wi, self.curve, self.bound)
+    }
+}
+
+impl<L: Lanes> Evaluate<L> for &Host<f32> {
+    #[inline(always)]
+    fn toward(&self, wi: V3<L>) -> Evaluated<L> {
+        Evaluated { f: self.f(wi), pdf: self.pdf(wi), bound: self.albedo_bound(wi) }
+    }
+}
+
+impl<L: Lanes> LobeVisitor<f32> for Visit<'_, '_, L> {
+    #[inline(always)]
+    fn scattering(self, lobe: &impl Lobe<f32>) {
+        let (curve, bound) = (self.l.curve, self.l.in_top);
+        self.add_up(Listed { lobe, curve, bound });
+    }
+
+    #[inline(always)]
+    fn host(self, lobe: &Host<f32>) {
+        self.add_up(lobe);
+    }
+}
+
+type Stack<L> = LayerStack<L, DEPTH, 1>;
+
+/// Layers in layers, or layers that were solved for. All channels are dimmed alike.
 struct Deep<'a, 'm, L> {
     bsdf: &'a Bsdf<'m>,
     next: usize,
     layer: usize,
-    stack: LayerStack<L, DEPTH, 1>,
+    stacks: [Stack<L>; BLOCKS],
 }
 
-impl<L: Lanes> Deep<'_, '_, L> {
-    /// Goes on to lobe `index`; what the layers above it scale it by.
+impl<'a, 'm, L: Lanes> Deep<'a, 'm, L> {
     #[inline(always)]
-    fn scale(&mut self, index: usize, local: &V3<L>) -> [L; 3] {
+    fn new(bsdf: &'a Bsdf<'m>) -> Self {
+        Deep { bsdf, next: 0, layer: 0, stacks: [LayerStack::default(); BLOCKS] }
+    }
+
+    /// Goes on to the next lobe, and leaves what the layers above it scale it by.
+    #[inline(always)]
+    fn go_on(&mut self, blocks: &mut [Block<L>]) {
         let bsdf = self.bsdf;
+        let stacks = &mut self.stacks[..blocks.len()];
         for op in &bsdf.ops[self.next..] {
             self.next += 1;
             match *op {
                 Op::Lobe => break,
-                Op::Begin => self.stack.begin(),
+                Op::Begin => stacks.iter_mut().for_each(LayerStack::begin),
                 Op::Middle => {
                     let LayerAlpha { alpha_o, weight } = bsdf.layers[self.layer];
+                    let Layering { rule, tint } = bsdf.layering;
                     self.layer += 1;
-                    self.stack.middle(weight, bsdf.layering.rule, bsdf.layering.tint, Some(alpha_o));
+                    for stack in &mut *stacks {
+                        stack.middle(weight, rule, tint, Some(alpha_o));
+                    }
                 }
-                Op::End => self.stack.end(),
+                Op::End => stacks.iter_mut().for_each(LayerStack::end),
             }
         }
-        match bsdf.balanced.get(index) {
-            Some(Some(balanced)) => balanced.scale(local.z),
-            _ => self.stack.scale(),
+        for (block, stack) in blocks.iter_mut().zip(stacks) {
+            block.scale = stack.scale()[0];
         }
     }
 }

@@ -10,11 +10,12 @@ use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{Frame, Lift, Over, Real, Scalar, V3};
+use crate::optics::{Frame, Over, Real, Scalar, V3};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Eval<S = f32> {
     /// Σ w·f·|N·ωi| per channel, each lobe with its own normal; delta lobes left out.
     pub f_cos: Rgb<S>,
@@ -459,7 +460,8 @@ pub(super) fn add<S: Scalar, L: Over<S>>(
     let values = [e.f[0], e.f[1], e.f[2], e.pdf];
     let scales = [scale[0] * cos, scale[1] * cos, scale[2] * cos, L::one()];
     for k in 0..4 {
-        sum[k] += L::lift(l.share[k]) * values[k] * scales[k];
+        // In this order, because a lobe without color has but one such product.
+        sum[k] += L::lift(l.share[k]) * (values[k] * scales[k]);
     }
 }
 
@@ -473,8 +475,7 @@ impl<S: Scalar> FlatLobe<'_, S> {
 /// A million terms of weight 1e30 are still a number.
 #[inline(always)]
 pub(super) fn finite<L: Real>(x: L) -> L {
-    let most = L::c(f32::MAX as f64);
-    L::select(x.lt(most), x, most)
+    x.min(L::c(f32::MAX as f64))
 }
 
 /// Directions that are not finite, or far from unit length, become zero: in every surface at once, hence black.

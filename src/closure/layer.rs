@@ -45,11 +45,7 @@ pub enum TintRule {
 pub fn alpha<L: Real, const C: usize>(tint: TintRule, bound: Rgb<L>) -> [L; C] {
     let pass = |e: L| (L::one() - e).clamp(L::zero(), L::one());
     match tint {
-        TintRule::Largest => {
-            // Not `max`, which looks out for NaN: that passes nothing either way.
-            let larger = |a: L, b: L| L::select(a.gt(b), a, b);
-            [pass(larger(larger(bound[0], bound[1]), bound[2])); C]
-        }
+        TintRule::Largest => [pass(bound[0].max(bound[1]).max(bound[2])); C],
         TintRule::Channel => array(|c| pass(bound[c])),
     }
 }
@@ -78,6 +74,7 @@ pub(crate) mod step {
 
 /// [`LayerStack`] for trees whose tops hold no layers and whose bases hold one at their end, as scripts build them
 /// (`Ci = sheen(Ci, …)`), all channels dimmed alike: the same numbers for less.
+#[derive(Clone, Copy)]
 pub(crate) struct FlatStack<L> {
     /// Bound on the albedo of the top being walked, so far; the fourth is idle, but four go as one.
     bound: [L; 4],
@@ -139,6 +136,7 @@ struct Saved<L, const C: usize> {
 ///
 /// `D` is how many layers may be open at once. `C` is 3, or 1 where all channels are dimmed alike ([`TintRule::Largest`]):
 /// the same numbers for a third of the work.
+#[derive(Clone, Copy)]
 pub struct LayerStack<L, const D: usize, const C: usize = 3> {
     saved: [Saved<L, C>; D],
     open: usize,

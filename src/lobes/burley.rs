@@ -9,9 +9,9 @@
 
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
-use crate::albedo::curve::no_extra;
+use crate::albedo::curve::{no_cells, no_extra};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -87,6 +87,7 @@ impl<S: Real> Lobe<S> for Burley<S> {
             reciprocal: true,
             bounded: true,
             extra: no_extra,
+            cells: no_cells,
         })
     }
 

@@ -8,8 +8,9 @@
 //! `examples/fit_sheen.rs`; the series is within 3e-7 of the quadrature for r in [0.001, 1] and every angle.
 
 use super::charlie_terms::TERMS;
+use crate::albedo::Cells;
 use crate::albedo::quadrature::Rule;
-use crate::optics::{Lift, Over, Real, V3, octaves};
+use crate::optics::{Over, Real, V3, octaves};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 /// The distribution D for one roughness.
@@ -34,20 +35,6 @@ impl<S: Real> Fibres<S> {
     pub fn d<L: Over<S>>(&self, cot2: L) -> L {
         L::lift(self.norm) * (-L::lift(self.exponent) * cot2.ln_1p()).exp()
     }
-}
-
-impl Fibres<f64> {
-    /// D over sin²θh as cubics, for [`read_d`], within 5e-6 for the lowest roughness, 0.07, and 1e-7 from 0.13 on; empty
-    /// where its exponent is too large for them.
-    pub(crate) fn cubics(&self) -> Vec<f64> {
-        if self.exponent <= 7.2 { octaves::fit::<64, 4>(|sin2| self.d(1.0 / sin2 - 1.0)) } else { vec![] }
-    }
-}
-
-/// D at sin²θh from [`Fibres::cubics`]: a logarithm and an exponential less. `None` if there are none.
-#[inline(always)]
-pub(crate) fn read_d<L: Real>(cubics: &[L::Entry], sin2: L) -> Option<L> {
-    L::octaves::<64, 4, 1024>(cubics, sin2)
 }
 
 /// sin² of the angle between the half vector of `wo` and `wi` and the normal.
@@ -128,40 +115,66 @@ impl<S: Real> FittedLambda<S> {
     }
 }
 
-impl FittedLambda<f64> {
-    /// Λ as it is, for [`read_lambda`], within 2e-6.
-    pub(crate) fn cubics(&self) -> Vec<f64> {
-        from_both_ends::<3>(|cos| self.lambda(cos, 0.0))
+/// D, Λ and the albedos of a fitted sheen as [`Cells`]: Λ toward a light as `soften` makes it. Within 5e-6 of the formulas
+/// for the lowest roughness, 0.07, and 1e-6 from 0.13 on; `None` where the exponent of D is too large for cubics. Cosines
+/// below `least` are read as that: the bound there covers them.
+pub(crate) fn cells(
+    (fibres, fit, soften): (&Fibres<f64>, &FittedLambda<f64>, f64),
+    least: f64,
+    view: &dyn Fn(f64) -> f64,
+    bound: &dyn Fn(f64) -> f64,
+) -> Option<Cells> {
+    if fibres.exponent > 7.2 {
+        return None;
     }
-
-    /// [`lambda`](Self::lambda), softened or not, for [`read_softened`], within 5e-6.
-    pub(crate) fn softened_cubics(&self, soften: f64) -> Vec<f64> {
-        from_both_ends::<4>(|cos| self.lambda(cos, soften))
-    }
+    let lowest = (1..=64).map(|k| bound(least * f64::from(k) / 64.0)).fold(0.0, f64::max);
+    // A hair more, because single precision may round `least` up.
+    let bound = |cos: f64| if cos > least * (1.0 + 1e-6) { bound(cos) } else { lowest };
+    let light = |cubic: Vec<[f64; 4]>, square: Vec<[f64; 3]>| {
+        cubic.into_iter().zip(square).map(|([a, b, c, d], [e, f, g])| [a, b, c, d, e, f, g, 0.0])
+    };
+    let toward_light = |cos: f64| fit.lambda(cos, soften);
+    let low = light(octaves::fit::<32, 4>(toward_light), octaves::above::<32, 4>(bound, 2e-7));
+    let high =
+        light(octaves::fit::<32, 4>(|x| toward_light(1.0 - x)), octaves::above::<32, 4>(|x| bound(1.0 - x), 2e-7));
+    let viewer = |lambda: Vec<[f64; 4]>, view: Vec<[f64; 4]>| {
+        lambda.into_iter().zip(view).map(|([a, b, c, d], [e, f, g, h])| [a, b, c, d, e, f, g, h])
+    };
+    let plain = |cos: f64| fit.lambda(cos, 0.0);
+    let near = viewer(octaves::fit::<32, 3>(plain), octaves::fit::<32, 3>(view));
+    let far = viewer(octaves::fit::<32, 3>(|x| plain(1.0 - x)), octaves::fit::<32, 3>(|x| view(1.0 - x)));
+    Some(Cells {
+        half: octaves::table(octaves::fit::<64, 4>(|sin2| fibres.d(1.0 / sin2 - 1.0))),
+        light: octaves::table(low.chain(high)),
+        viewer: octaves::table(near.chain(far)),
+    })
 }
 
-/// Λ changes as powers do toward both ends.
-fn from_both_ends<const DIGITS: i32>(lambda: impl Fn(f64) -> f64) -> Vec<f64> {
-    let low = octaves::fit::<32, DIGITS>(&lambda);
-    low.into_iter().chain(octaves::fit::<32, DIGITS>(|x| lambda(1.0 - x))).collect()
-}
-
-/// Where [`from_both_ends`] has put a cosine.
+/// Which end a cosine is nearer to: Λ changes as powers do toward both.
 #[inline(always)]
 fn from_its_end<L: Real>(cos: L) -> L {
     L::select(cos.lt(L::c(0.5)), cos, -(L::one() - cos))
 }
 
-/// Λ(μ) from [`FittedLambda::cubics`]: a power, an exponential and a division less. `None` if there are none.
+/// D at sin²θh from [`cells`]: a logarithm and an exponential less.
 #[inline(always)]
-pub(crate) fn read_lambda<L: Real>(cubics: &[L::Entry], cos: L) -> Option<L> {
-    L::octaves::<32, 3, 512>(cubics, from_its_end(cos))
+pub(crate) fn read_d<L: Real>(cells: &Cells, sin2: L) -> Option<L> {
+    let (row, t) = L::octaves::<64, 4, 1024, 4>(&cells.half, sin2)?;
+    Some(octaves::cubic(row, t))
 }
 
-/// Λ(μ) from [`FittedLambda::softened_cubics`], which are finer because it is steeper. `None` if there are none.
+/// Λ toward a light, and the bound of the albedo there.
 #[inline(always)]
-pub(crate) fn read_softened<L: Real>(cubics: &[L::Entry], cos: L) -> Option<L> {
-    L::octaves::<32, 4, 1024>(cubics, from_its_end(cos))
+pub(crate) fn read_light<L: Real>(cells: &Cells, cos: L) -> Option<(L, L)> {
+    let ([a, b, c, d, e, f, g, _], t) = L::octaves::<32, 4, 1024, 8>(&cells.light, from_its_end(cos))?;
+    Some((octaves::cubic([a, b, c, d], t), octaves::square([e, f, g], t)))
+}
+
+/// Λ toward the viewer, and the albedo seen from there.
+#[inline(always)]
+pub(crate) fn read_viewer<L: Real>(cells: &Cells, cos: L) -> Option<(L, L)> {
+    let ([a, b, c, d, e, f, g, h], t) = L::octaves::<32, 3, 512, 8>(&cells.viewer, from_its_end(cos))?;
+    Some((octaves::cubic([a, b, c, d], t), octaves::cubic([e, f, g, h], t)))
 }
 
 /// The lowest roughness the series of the exact Λ covers.
@@ -313,31 +326,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_read_off_cubics_is_the_formula() {
+    fn what_is_read_off_cells_is_the_formula() {
         let close = |read: f32, truth: f64, relative: f64, what: &str| {
             assert!((f64::from(read) - truth).abs() <= relative * truth + 1e-6, "{what}: {read} for {truth}");
         };
-        let single = |cubics: Vec<f64>| cubics.into_iter().map(|c| c as f32).collect::<Vec<_>>();
+        let (view, bound) = (|cos: f64| 0.1 + 0.8 * (1.0 - cos).powi(3), |cos: f64| (0.3f64).max(0.9 - 2.0 * cos));
         for r in [0.07, 0.2, 0.4, 1.0] {
             let fibres = Fibres::new(r);
-            let powers = single(fibres.cubics());
             for (fit, soften) in [(FittedLambda::published(r), 2.0), (FittedLambda::refitted(r), 0.0)] {
-                let [plain, softened] = [single(fit.cubics()), single(fit.softened_cubics(soften))];
+                let cells = cells((&fibres, &fit, soften), 1e-4, &view, &bound).expect("its exponent is small");
                 let mut cos = 1.0f32;
                 while cos > 1e-4 {
                     for cos in [cos, 1.0 - cos * cos] {
                         let cos = cos.max(1e-4);
-                        let at = format!("Λ at {cos}, roughness {r}");
-                        close(read_lambda(&plain, cos).expect("cubics"), fit.lambda(cos.into(), 0.0), 2e-6, &at);
-                        let read = read_softened(&softened, cos).expect("cubics");
-                        close(read, fit.lambda(cos.into(), soften), 5e-6, &at);
+                        let (at, exact) = (format!("at {cos}, roughness {r}"), f64::from(cos));
+                        let (lambda, albedo) = read_viewer(&cells, cos).expect("single precision");
+                        close(lambda, fit.lambda(exact, 0.0), 2e-6, &at);
+                        close(albedo, view(exact), 2e-6, &at);
+                        let (lambda, most) = read_light(&cells, cos).expect("single precision");
+                        close(lambda, fit.lambda(exact, soften), 5e-6, &at);
+                        assert!(
+                            (0.0..2e-3).contains(&(f64::from(most) - bound(exact))),
+                            "{most} for {}, {at}",
+                            bound(exact)
+                        );
                     }
                     let truth = fibres.d(1.0 / f64::from(cos) - 1.0);
-                    close(read_d(&powers, cos).expect("cubics"), truth, 6e-6, &format!("D at {cos}, roughness {r}"));
+                    close(read_d(&cells, cos).expect("cubics"), truth, 6e-6, &format!("D at {cos}, roughness {r}"));
                     cos *= 0.97;
                 }
             }
         }
-        assert!(Fibres::new(0.02).cubics().is_empty());
+        let fibres = Fibres::new(0.02);
+        assert!(cells((&fibres, &FittedLambda::refitted(0.02), 0.0), 1e-4, &view, &bound).is_none());
     }
 }

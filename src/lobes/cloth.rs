@@ -21,7 +21,7 @@ use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
 use super::registry::ClosureParams;
 use super::{Lobe, Rgb, Rgb32};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, HORIZON, Ridges, TableSpec};
-use crate::optics::{F32x8, Lift, Over, Real, V3, lifted, rgb, sampling};
+use crate::optics::{F32x8, Over, Real, V3, lifted, rgb, sampling};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
 

@@ -14,7 +14,7 @@ use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::film::Film;
-use crate::optics::{Lift, Over, Real, V3, fresnel};
+use crate::optics::{Over, Real, V3, fresnel};
 
 closure! {
     /// Reflection by a metal's facets, what bounces between them included. One-sided.

@@ -19,7 +19,7 @@ use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_w
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Over, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Reflection and refraction between two media, what bounces between the facets included. Two-sided.

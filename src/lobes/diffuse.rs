@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 
 closure! {
     /// Lambertian reflection: f = 1/π where ωo and ωi lie on the normal's side. Albedo 1 on that side, 0 below.

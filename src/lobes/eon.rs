@@ -15,7 +15,7 @@ use super::ltc_tables::EON;
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Over, Real, V3, rgb};
+use crate::optics::{Over, Real, V3, rgb};
 use std::f64::consts::{FRAC_1_PI, PI};
 
 closure! {

@@ -13,7 +13,7 @@ use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::AlbedoCurve;
 use crate::albedo::{COMPONENTS, FibreKey, FibreSpec, TableSpec};
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {

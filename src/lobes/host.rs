@@ -9,7 +9,7 @@
 
 use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
 use super::{Evaluated, LobeKind, Rgb, Rgb32, Sides};
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::{Mutex, PoisonError};

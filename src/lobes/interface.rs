@@ -23,7 +23,7 @@ use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Over, Real, V3, array, fresnel, lifted, rgb, sampling};
+use crate::optics::{Over, Real, V3, array, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// The index that is used for a script's: between 1/4 and 4, and no closer to 1 than 1 %, where refraction would become

@@ -5,7 +5,7 @@
 //! keeps the horizon where it is, so the density integrates to 1 over the hemisphere. The parameters a, b, c come from
 //! tables over ωo's cosine and the roughness, fitted by `examples/fit_sheen.rs`.
 
-use crate::optics::{Lift, Over, Real, V3, array, lifted, sampling};
+use crate::optics::{Over, Real, V3, array, lifted, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// Nodes of a table over √μ.

@@ -10,7 +10,7 @@ use super::registry::{ClosureParams, closure};
 use super::rough::widths;
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Over, Real, V3};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Reflection by a metal's facets, the metal given by its colors. One-sided.

@@ -46,7 +46,7 @@ pub mod velvet;
 pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
-use crate::optics::{Lift, Over, Real, V3};
+use crate::optics::{Over, Real, V3};
 use limits::{Limits, SlotRange};
 use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
 
@@ -143,6 +143,14 @@ pub trait Lobe<S: Real>: Sized + Copy {
     /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
     fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L>;
 
+    /// All that evaluating a BSDF asks at once: [`f`](Lobe::f), [`pdf`](Lobe::pdf) and, if it is asked for, the
+    /// [`albedo_bound`](Lobe::albedo_bound), the same bits.
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        let bound = if bound { self.albedo_bound(wi, curve) } else { [L::zero(); 3] };
+        Evaluated { f: self.f(wi, curve), pdf: self.pdf(wi), bound }
+    }
+
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L;
 
@@ -203,19 +211,16 @@ pub struct Evaluated<L> {
 }
 
 #[inline(always)]
-fn evaluate<S: Real, L: Over<S>>(
-    lobe: &impl Lobe<S>,
-    wi: V3<L>,
-    curve: &AlbedoCurve<S::Entry>,
-    bound: bool,
-) -> Evaluated<L> {
-    let bound = if bound { lobe.albedo_bound(wi, curve) } else { [L::zero(); 3] };
-    Evaluated { f: lobe.f(wi, curve), pdf: lobe.pdf(wi), bound }
-}
-
-#[inline(always)]
 fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
     [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
+}
+
+/// Something to do with a lobe whose type is known.
+pub(crate) trait LobeVisitor<S: Real> {
+    /// A lobe of the list.
+    fn scattering(self, lobe: &impl Lobe<S>);
+    /// One that a host brought along.
+    fn host(self, lobe: &host::Host<S>);
 }
 
 macro_rules! lobes {
@@ -335,9 +340,9 @@ macro_rules! lobes {
             #[inline(always)]
             pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
-                    AnyLobe::Diffuse(l) => evaluate(l, wi, curve, bound),
-                    AnyLobe::Sheen(l) => evaluate(l, wi, curve, bound),
-                    AnyLobe::OrenNayar(l) => evaluate(l, wi, curve, bound),
+                    AnyLobe::Diffuse(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
+                    AnyLobe::Sheen(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
+                    AnyLobe::OrenNayar(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
                     _ => self.evaluate_apart(wi, curve, bound),
                 }
             }
@@ -345,7 +350,7 @@ macro_rules! lobes {
             #[inline(never)]
             fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
-                    $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
+                    $( AnyLobe::$Lobe(l) => Lobe::<S>::evaluate(l, wi, curve, bound), )*
                     AnyLobe::Host(l) => l.evaluate(wi, bound),
                 }
             }
@@ -421,18 +426,13 @@ macro_rules! lobes {
         }
 
         impl<S: Real> AnyLobe<S> {
-            /// [`evaluate`](Self::evaluate) for lanes side by side, the same bits. All of it in one place: what is called is
-            /// not compiled for the processor's vectors.
+            /// Shows `visitor` the lobe as what it is. All of it in one place: what is called is not compiled for the
+            /// processor's vectors.
             #[inline(always)]
-            pub(crate) fn evaluate_lanes<L: Over<S>>(
-                &self,
-                wi: V3<L>,
-                curve: &AlbedoCurve<S::Entry>,
-                bound: bool,
-            ) -> Evaluated<L> {
+            pub(crate) fn visit(&self, visitor: impl LobeVisitor<S>) {
                 match self {
-                    $( AnyLobe::$Lobe(l) => evaluate(l, wi, curve, bound), )*
-                    AnyLobe::Host(l) => Evaluated { f: l.f(wi), pdf: l.pdf(wi), bound: l.albedo_bound(wi) },
+                    $( AnyLobe::$Lobe(l) => visitor.scattering(l), )*
+                    AnyLobe::Host(l) => visitor.host(l),
                 }
             }
         }

@@ -14,7 +14,7 @@ use super::rough::{chance, largest, split, thin};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Over, Real, V3, array, fresnel, lifted, rgb, sampling};
+use crate::optics::{Over, Real, V3, array, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// What a pane reflects at the cosine `c`; `m` is η² − 1.

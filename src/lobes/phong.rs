@@ -12,10 +12,10 @@
 use super::limits::{Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
-use crate::albedo::curve::no_extra;
+use crate::albedo::curve::{no_cells, no_extra};
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 use std::sync::OnceLock;
 
@@ -117,6 +117,7 @@ impl<S: Real> Lobe<S> for Phong<S> {
             reciprocal: true,
             bounded: false,
             extra: no_extra,
+            cells: no_cells,
         })
     }
 

@@ -11,7 +11,7 @@ use super::registry::LobeSpec;
 use crate::albedo::facets::{FacetKey, FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
-use crate::optics::{Lift, Over, Real, V3, fresnel, lifted, rgb, sampling};
+use crate::optics::{Over, Real, V3, fresnel, lifted, rgb, sampling};
 use std::f64::consts::FRAC_1_PI;
 
 /// The distributions a script may name.

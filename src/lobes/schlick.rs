@@ -20,7 +20,7 @@ use super::rough::{
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Lift, Over, Real, V3, rgb};
+use crate::optics::{Over, Real, V3, rgb};
 
 closure! {
     /// Reflection with a color facing and a color grazing, and refraction of the rest if it has a tint; what bounces between

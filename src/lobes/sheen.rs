@@ -29,10 +29,10 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Lobe, LobeKind, Rgb};
+use super::{Evaluated, Lobe, LobeKind, Rgb};
 use crate::albedo::curve::Extra;
-use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Over, Real, Scalar, V3};
+use crate::albedo::{AlbedoCurve, Axis, Cells, CurveSpec};
+use crate::optics::{Over, Real, Scalar, V3};
 
 closure! {
     /// Cloth sheen: fibres standing along the normal, seen as a glow toward grazing angles. By default the fitted
@@ -168,6 +168,11 @@ impl Variant {
         }
     }
 
+    /// The one whose bit is set, if it is the only one.
+    fn only(mask: u32) -> Option<Variant> {
+        if mask.is_power_of_two() { Variant::ALL.get(mask.trailing_zeros() as usize).copied() } else { None }
+    }
+
     fn reciprocal(self) -> bool {
         matches!(self, Fitted | Refit | Exact | CharlieV)
     }
@@ -199,20 +204,24 @@ impl<S: Real> FittedFor<S> {
     #[inline(always)]
     fn lambda_o(&self, wo: V3<S>, known: Known<'_, S::Entry>) -> S {
         let cos = fitted_cosine(wo);
-        match charlie::read_lambda(known.lambda_o, cos) {
-            Some(lambda) => lambda,
-            None => self.fit.lambda(cos, S::zero()),
+        if let Some(cells) = known.cells
+            && let Some((lambda, _)) = charlie::read_viewer(cells, cos)
+        {
+            return lambda;
         }
+        self.fit.lambda(cos, S::zero())
     }
 
     /// Λ toward a light.
     #[inline(always)]
     fn lambda_i<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let cos = fitted_cosine(wi);
-        match charlie::read_softened(known.lambda_i, cos) {
-            Some(lambda) => lambda,
-            None => self.fit.lambda(cos, self.soften),
+        if let Some(cells) = known.cells
+            && let Some((lambda, _)) = charlie::read_light(cells, cos)
+        {
+            return lambda;
         }
+        self.fit.lambda(cos, self.soften)
     }
 }
 
@@ -296,7 +305,7 @@ impl<S: Real> Sheen<S> {
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
     fn value<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
-        match self.shadowing {
+        match &self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi, self.d(wi, known), fitted.lambda_i(wi, known)),
             _ if L::WIDE => self.value_of_any(wi, known),
             _ => self.value_apart(wi, known),
@@ -312,11 +321,11 @@ impl<S: Real> Sheen<S> {
     #[inline(always)]
     fn value_of_any<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let d = self.d(wi, known);
-        match self.shadowing {
+        match &self.shadowing {
             Shadowing::Fitted(fitted) => self.fitted(fitted, wi, d, fitted.lambda_i(wi, known)),
-            Shadowing::Exact { exact, cos_lambda_o } => self.exact(exact, cos_lambda_o, wi, d, known.terms),
+            Shadowing::Exact { exact, cos_lambda_o } => self.exact(*exact, *cos_lambda_o, wi, d, known.terms),
             Shadowing::Visibility => self.visible(wi, d),
-            Shadowing::Transformed { albedo } => self.transformed(albedo, wi),
+            Shadowing::Transformed { albedo } => self.transformed(*albedo, wi),
         }
     }
 
@@ -324,10 +333,12 @@ impl<S: Real> Sheen<S> {
     #[inline(always)]
     fn d<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let wo = V3::<L>::lift(self.wo);
-        match charlie::read_d(known.powers, charlie::half_sin2(wo, wi)) {
-            Some(d) => d,
-            None => self.fibres.d(charlie::half_cot2(wo, wi)),
+        if let Some(cells) = known.cells
+            && let Some(d) = charlie::read_d(cells, charlie::half_sin2(wo, wi))
+        {
+            return d;
         }
+        self.fibres.d(charlie::half_cot2(wo, wi))
     }
 
     /// `f` where both directions lie above the surface, else 0.
@@ -337,8 +348,8 @@ impl<S: Real> Sheen<S> {
     }
 
     #[inline(always)]
-    fn fitted<L: Over<S>>(&self, fitted: FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
-        let FittedFor { lambda_o, scale, .. } = fitted;
+    fn fitted<L: Over<S>>(&self, fitted: &FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
+        let FittedFor { lambda_o, scale, .. } = *fitted;
         self.above(wi, d * L::lift(scale) / (fitted_cosine(wi) * (L::lift(lambda_o) + lambda_i)))
     }
 
@@ -387,7 +398,7 @@ impl<S: Real> Sheen<S> {
         }
     }
 
-    /// For [`CurveSpec::extra`]: the parts of [`Known`].
+    /// For [`CurveSpec::extra`]: the terms and the row of [`Known`].
     fn extra(key: &[f64; 4], axis: Option<Axis>) -> Extra<f64> {
         let mask = key[1] as u32;
         let terms = match axis {
@@ -395,41 +406,39 @@ impl<S: Real> Sheen<S> {
             Some(_) => charlie::term_rows(),
             None => charlie::terms_at(key[0]).to_vec(),
         };
-        if axis.is_some() || !mask.is_power_of_two() {
-            return [terms, vec![], vec![], vec![], vec![]];
+        match Variant::only(mask) {
+            Some(variant) if axis.is_none() => [terms, ltc::row(variant.table(), key[0])],
+            _ => [terms, vec![]],
         }
-        let variant = Variant::ALL[mask.trailing_zeros() as usize];
-        let lobe = Sheen::<f64>::prepare(variant, key[0], V3::new(0.0, 0.0, 1.0), Known { terms: &terms, ..NOTHING });
-        let [lambda_o, lambda_i] = match lobe.shadowing {
-            Shadowing::Fitted(FittedFor { fit, soften, .. }) => [fit.cubics(), fit.softened_cubics(soften)],
-            _ => [vec![], vec![]],
-        };
-        let powers = if variant == Zeltner { vec![] } else { lobe.fibres.cubics() };
-        [terms, ltc::row(variant.table(), key[0]), powers, lambda_o, lambda_i]
+    }
+
+    /// For [`CurveSpec::cells`].
+    fn cells(key: &[f64; 4], view: &dyn Fn(f64) -> f64, bound: &dyn Fn(f64) -> f64) -> Option<Cells> {
+        let variant = Variant::only(key[1] as u32)?;
+        let lobe = Sheen::<f64>::prepare(variant, key[0], V3::new(0.0, 0.0, 1.0), NOTHING);
+        let Shadowing::Fitted(FittedFor { fit, soften, .. }) = lobe.shadowing else { return None };
+        charlie::cells((&lobe.fibres, &fit, soften), MIN_COS, view, bound)
     }
 }
 
-/// What [`Sheen::extra`] gave; each may be empty.
+/// What [`Sheen::extra`] and [`Sheen::cells`] gave; each may be empty.
 #[derive(Clone, Copy)]
 struct Known<'a, E> {
     /// The coefficients of the exact Λ, where it may be asked for.
     terms: &'a [E],
     /// Of a lobe that is all known: its row of the transformed cosines, …
     row: &'a [E],
-    /// … the cubics of D, …
-    powers: &'a [E],
-    /// … and those of its fitted Λ, toward the viewer and toward a light.
-    lambda_o: &'a [E],
-    lambda_i: &'a [E],
+    /// … and in single precision D, its fitted Λ and albedos.
+    cells: Option<&'a Cells>,
 }
 
-const NOTHING: Known<'static, f64> = Known { terms: &[], row: &[], powers: &[], lambda_o: &[], lambda_i: &[] };
+const NOTHING: Known<'static, f64> = Known { terms: &[], row: &[], cells: None };
 
 impl<'a, E: Scalar> Known<'a, E> {
     #[inline(always)]
     fn of(curve: &'a AlbedoCurve<E>) -> Self {
-        let [terms, row, powers, lambda_o, lambda_i] = curve.extra();
-        Known { terms, row, powers, lambda_o, lambda_i }
+        let [terms, row] = curve.extra();
+        Known { terms, row, cells: curve.cells() }
     }
 }
 
@@ -447,6 +456,12 @@ fn fitted_cosine<L: Real>(w: V3<L>) -> L {
 #[inline(always)]
 fn unit_cosine<L: Real>(w: V3<L>) -> L {
     w.z.clamp(L::zero(), L::one())
+}
+
+/// `value` above the surface, else 0.
+#[inline(always)]
+fn lit<L: Real>(w: V3<L>, value: L) -> L {
+    L::select(w.z.gt(L::zero()), value, L::zero())
 }
 
 /// sin²θ without cancellation near the normal.
@@ -484,6 +499,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
             reciprocal: variants.iter().all(|v| v.reciprocal()),
             bounded: mask.count_ones() > 1 || variants.iter().any(|v| v.gains(roughness.unwrap_or(lo))),
             extra: Sheen::<f64>::extra,
+            cells: Sheen::<f64>::cells,
         })
     }
 
@@ -529,7 +545,26 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     }
 
     #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        if let Some(cells) = curve.cells()
+            && let Shadowing::Fitted(fitted) = &self.shadowing
+            && let Some((lambda, most)) = charlie::read_light(cells, fitted_cosine(wi))
+        {
+            let f = self.fitted(fitted, wi, self.d(wi, Known::of(curve)), lambda);
+            let bound = if bound { lit(wi, most) } else { L::zero() };
+            return Evaluated { f: [f; 3], pdf: self.pdf(wi), bound: [bound; 3] };
+        }
+        let bound = if bound { self.albedo_bound(wi, curve) } else { [L::zero(); 3] };
+        Evaluated { f: self.f(wi, curve), pdf: self.pdf(wi), bound }
+    }
+
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
+        if let Some(cells) = curve.cells()
+            && let Some((_, albedo)) = charlie::read_viewer(cells, fitted_cosine(w))
+        {
+            return [lit(w, albedo); 3];
+        }
         [curve.view(w, self.roughness); 3]
     }
 
@@ -539,6 +574,11 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
+        if let Some(cells) = curve.cells()
+            && let Some((_, bound)) = charlie::read_light(cells, fitted_cosine(w))
+        {
+            return [lit(w, bound); 3];
+        }
         let bound = curve.bound(w, L::lift(self.roughness));
         // E_light integrates over the kinks of the fitted table, which the baking resolves to 1e-4 only.
         let slack = if matches!(self.shadowing, Shadowing::Transformed { .. }) { 2e-4 } else { 0.0 };

@@ -6,7 +6,7 @@ use super::interface::index;
 use super::registry::{Build, ClosureParams, Form, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Over, Real, V3, fresnel};
+use crate::optics::{Over, Real, V3, fresnel};
 
 closure! {
     /// Mirror reflection, a delta lobe. Without an index all light is reflected, on the normal's side; with one what a

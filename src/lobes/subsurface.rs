@@ -7,7 +7,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
 use super::{Lobe, LobeKind, Rgb, Rgb32};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 
 closure! {
     /// Scattering below the surface, drawn as `albedo * diffuse(N)` unless the renderer takes it over: soft shadows and

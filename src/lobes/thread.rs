@@ -18,7 +18,7 @@ use super::limits::{self, Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
-use crate::optics::{Lift, Over, Real, V3, lifted, rgb, sampling};
+use crate::optics::{Over, Real, V3, lifted, rgb, sampling};
 use std::f64::consts::PI;
 
 closure! {

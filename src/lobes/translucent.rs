@@ -4,7 +4,7 @@ use super::limits::{Limits, SlotRange};
 use super::registry::closure;
 use super::{Lobe, Rgb, Sides};
 use crate::albedo::AlbedoCurve;
-use crate::optics::{Lift, Over, Real, V3, sampling};
+use crate::optics::{Over, Real, V3, sampling};
 
 closure! {
     /// Lambertian transmission: f = 1/π where ωo and ωi lie on opposite sides, either way round. Albedo 1 from both.

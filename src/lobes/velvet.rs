@@ -12,9 +12,9 @@ use super::ltc::Ltc;
 use super::ltc_tables::VELVET;
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb, charlie, sheen};
-use crate::albedo::curve::no_extra;
+use crate::albedo::curve::{no_cells, no_extra};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
-use crate::optics::{Lift, Over, Real, V3};
+use crate::optics::{Over, Real, V3};
 use std::f64::consts::FRAC_1_PI;
 
 closure! {
@@ -87,6 +87,7 @@ impl<S: Real> Lobe<S> for Velvet<S> {
             reciprocal: true,
             bounded: false,
             extra: no_extra,
+            cells: no_cells,
         })
     }
 

@@ -13,10 +13,11 @@
 use super::limits::{Limits, SlotRange};
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
+use crate::albedo::curve::no_cells;
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::microfacet::mirror;
-use crate::optics::{Lift, Over, Real, V3, lifted};
+use crate::optics::{Over, Real, V3, lifted};
 use std::cell::Cell;
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, TAU};
 use std::sync::OnceLock;
@@ -178,7 +179,8 @@ impl<S: Real> Lobe<S> for Ward<S> {
             reciprocal: true,
             bounded: false,
             // Says that there is a table.
-            extra: |_, _| [vec![1.0], vec![], vec![], vec![], vec![]],
+            extra: |_, _| [vec![1.0], vec![]],
+            cells: no_cells,
         })
     }
 

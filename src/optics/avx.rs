@@ -48,11 +48,6 @@ impl Avx {
     fn from_array(x: &[f32; 8]) -> Self {
         Avx(avx!(_mm256_loadu_ps(x.as_ptr())))
     }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        let x = self.to_array();
-        Avx::from_array(&std::array::from_fn(|i| f(x[i])))
-    }
 }
 
 impl AvxBits {
@@ -319,14 +314,31 @@ impl Real for Avx {
         std::array::from_fn(|k| if k == 0 { first } else { second })
     }
     #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(table: &[f32], x: Self) -> Option<Self> {
-        let cubics = octaves::cubics::<CELLS>(table)?;
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(
+        table: &[[f32; WIDTH]; CELLS],
+        x: Self,
+    ) -> Option<([Self; WIDTH], Self)> {
         let (cell, t) = octaves::place::<OCTAVES, DIGITS, Self>(x);
         let places = cell.and(AvxBits::of(CELLS as u32 - 1)).to_array();
-        let four = |i: usize| &cubics[places[i] as usize & (CELLS - 1)];
-        let both = |i: usize| avx!(_mm256_set_m128(_mm_loadu_ps(four(i + 4).as_ptr()), _mm_loadu_ps(four(i).as_ptr())));
-        let [a, b, c, d] = turned([both(0), both(1), both(2), both(3)]);
-        Some(octaves::cubic([Avx(a), Avx(b), Avx(c), Avx(d)], t))
+        let mut columns = [Self::zero(); WIDTH];
+        let mut first = 0;
+        while first + 4 <= WIDTH {
+            let four = |i: usize| {
+                let row: &[f32; WIDTH] = &table[places[i] as usize & (CELLS - 1)];
+                // SAFETY: as in `avx!`; four numbers from `first` on are within the row.
+                unsafe { _mm_loadu_ps(row.as_ptr().add(first)) }
+            };
+            let [a, b, c, d] = turned([
+                avx!(_mm256_set_m128(four(4), four(0))),
+                avx!(_mm256_set_m128(four(5), four(1))),
+                avx!(_mm256_set_m128(four(6), four(2))),
+                avx!(_mm256_set_m128(four(7), four(3))),
+            ]);
+            [columns[first], columns[first + 1], columns[first + 2], columns[first + 3]] =
+                [Avx(a), Avx(b), Avx(c), Avx(d)];
+            first += 4;
+        }
+        Some((columns, t))
     }
 }
 
@@ -399,14 +411,6 @@ impl Lanes for Avx {
     }
 }
 
-impl Avx {
-    /// What every lane holds, for those who have no `Avx`.
-    #[inline(always)]
-    pub fn portable(self) -> F32x8 {
-        F32x8(self.to_array())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -434,7 +438,7 @@ mod tests {
                 }))
             };
             let table: Vec<f32> = (0..600).map(|k| (k as f32).sqrt()).collect();
-            let cubics: Vec<f32> = octaves::fit::<32, 4>(f64::sqrt).into_iter().map(|c| c as f32).collect();
+            let cubics: Box<[[f32; 4]; 512]> = octaves::table(octaves::fit::<32, 4>(f64::sqrt));
             for k in 0..15 {
                 let V3 { x, y, z } = lanes(k);
                 for v in [x + y, x - y, x * y, x / y, -x, x.min(y), x.max(y), x.abs(), x.copysign(y), x.abs().sqrt()] {
@@ -452,7 +456,8 @@ mod tests {
                 let angle = z.mul_add(L::c(7.0), L::c(-3.0));
                 let (sin, cos) = angle.sin_cos();
                 [sin, cos, z.atan2(angle), angle.atan2(z), L::quartic(&table, 599.0, z)].map(&mut keep);
-                keep(L::octaves::<32, 4, 512>(&cubics, z).expect("cubics"));
+                let (row, t) = L::octaves::<32, 4, 512, 4>(&cubics, z).expect("single precision");
+                keep(octaves::cubic(row, t));
                 keep(L::gather(&table, (z * L::c(599.0)).whole()));
                 let [a, b, c] = L::run(&table, (z * L::c(500.0)).whole());
                 [a, b, c].map(&mut keep);

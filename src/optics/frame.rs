@@ -1,6 +1,6 @@
 //! Orthonormal shading frames.
 
-use super::{Lift, Over, Real, Scalar, V3};
+use super::{Over, Scalar, V3};
 
 /// An orthonormal frame: `t` and `b` span the surface, `n` is the normal, t × b = n.
 #[derive(Clone, Copy, Debug, PartialEq)]

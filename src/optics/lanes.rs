@@ -162,9 +162,12 @@ impl Real for f32 {
         table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
     }
     #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(table: &[f32], x: f32) -> Option<f32> {
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(
+        table: &[[f32; WIDTH]; CELLS],
+        x: f32,
+    ) -> Option<([f32; WIDTH], f32)> {
         let (cell, t) = octaves::place::<OCTAVES, DIGITS, f32>(x);
-        Some(octaves::cubic(octaves::cubics::<CELLS>(table)?[cell as usize & (CELLS - 1)], t))
+        Some((table[cell as usize & (CELLS - 1)], t))
     }
 }
 
@@ -178,6 +181,7 @@ impl Scalar for f64 {
 }
 
 impl Scalar for f32 {
+    const SINGLE: bool = true;
     fn to_f64(self) -> f64 {
         self as f64
     }
@@ -395,23 +399,21 @@ impl Real for F32x8 {
     fn gather(table: &[f32], index: Self) -> Self {
         index.map(|i| <f32 as Real>::gather(table, i))
     }
-    /// In three loops, like [`quartic`](Self::quartic).
     #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(table: &[f32], x: Self) -> Option<Self> {
-        let cubics = octaves::cubics::<CELLS>(table)?;
-        let (mut cell, mut t) = ([0; 8], [0.0; 8]);
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(
+        table: &[[f32; WIDTH]; CELLS],
+        x: Self,
+    ) -> Option<([Self; WIDTH], Self)> {
+        let (mut rows, mut t) = ([F32x8([0.0; 8]); WIDTH], F32x8([0.0; 8]));
         for k in 0..8 {
-            (cell[k], t[k]) = octaves::place::<OCTAVES, DIGITS, f32>(x.0[k]);
+            let (cell, place) = octaves::place::<OCTAVES, DIGITS, f32>(x.0[k]);
+            let row = &table[cell as usize & (CELLS - 1)];
+            t.0[k] = place;
+            for (column, number) in rows.iter_mut().zip(row) {
+                column.0[k] = *number;
+            }
         }
-        let mut read = [[0.0; 4]; 8];
-        for k in 0..8 {
-            read[k] = cubics[cell[k] as usize & (CELLS - 1)];
-        }
-        let mut out = [0.0; 8];
-        for k in 0..8 {
-            out[k] = octaves::cubic(read[k], t[k]);
-        }
-        Some(F32x8(out))
+        Some((rows, t))
     }
     /// In three loops: the one in the middle, which reads, cannot become vector code, and would keep the rest from it.
     #[inline(always)]

@@ -9,7 +9,7 @@
 //! and the density of visible facets is 2·(ω·h)·D(h)/(μ + ℓ). D takes the half vector as it comes, ωo + ωi: its x and y
 //! keep their digits where a normalised h would have lost them, so that α = 1e-4 works in single precision.
 
-use super::{Lift, Over, Real, V3};
+use super::{Over, Real, V3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 /// The distribution of slopes.
@@ -42,12 +42,6 @@ impl<S: Real> Facets<S> {
     #[inline(always)]
     pub fn proposal(&self) -> Self {
         Facets { shape: Shape::Ggx, ..*self }
-    }
-
-    /// Whether the slopes are GGX's.
-    #[inline(always)]
-    pub(crate) fn is_ggx(&self) -> bool {
-        matches!(self.shape, Shape::Ggx)
     }
 
     /// The widths along x and y.

@@ -111,14 +111,13 @@ pub trait Real:
         array(|k| Self::gather(table, index + Self::c(k as f64)))
     }
 
-    /// A table of `CELLS` cubics, 2^`DIGITS` to each of `OCTAVES` octaves below 1, at `x`, |x| ≤ 1; those for negative
-    /// numbers come after those for positive ones. `None` if the table is none of this kind, or if the type has more digits
-    /// than cubics of single precision.
+    /// What a table of [`octaves`](super::octaves) holds for `x`, |x| ≤ 1: a row of its `CELLS`, 2^`DIGITS` to each of
+    /// `OCTAVES` octaves below 1, and where in the cell `x` lies. `None` if the type has more digits than such a table.
     #[inline(always)]
-    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize>(
-        table: &[Self::Entry],
+    fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(
+        table: &[[f32; WIDTH]; CELLS],
         x: Self,
-    ) -> Option<Self> {
+    ) -> Option<([Self; WIDTH], Self)> {
         let _ = (table, x);
         None
     }
@@ -170,6 +169,8 @@ pub trait Real:
 
 /// One number type for a single value, as opposed to lanes: what a BSDF is built in.
 pub trait Scalar: Real<Mask = bool, Entry = Self> + PartialOrd + Default {
+    /// Whether it is single precision, which tables of [`octaves`](super::octaves) are for.
+    const SINGLE: bool = false;
     /// In double precision.
     fn to_f64(self) -> f64;
     /// In single precision.

@@ -1,7 +1,7 @@
 //! Conty & Kulla 2017, figures 1 to 4, and the comparison of Narkowicz 2018.
 
 use super::{Bench, Figure, material};
-use crate::albedo::curve::{Kernel, Quadrature, no_extra};
+use crate::albedo::curve::{Kernel, Quadrature, no_cells, no_extra};
 use crate::albedo::{AlbedoCurve, CurveSpec, Precision};
 use crate::audit::{Side, Tolerance, albedo};
 use crate::cli::Failure;
@@ -92,7 +92,8 @@ fn fast(key: &[f64; 4], wo: V3<f64>, wi: &[V3<f64>], out: &mut [f64]) {
 /// The largest E_view of a raw lobe for cosines from 1e-3 to 1.
 fn largest(kernel: Kernel, key: [f64; 4]) -> f64 {
     let quadrature = Quadrature::new(Precision { polar: 96, azimuth: 64, ..Precision::REFERENCE });
-    let spec = CurveSpec { kernel, key, axis: None, reciprocal: true, bounded: false, extra: no_extra };
+    let spec =
+        CurveSpec { kernel, key, axis: None, reciprocal: true, bounded: false, extra: no_extra, cells: no_cells };
     let cosines = (0..=24).map(|k| 10f64.powf(-3.0 + f64::from(k) / 8.0).min(1.0));
     cosines.map(|c| quadrature.albedos(&spec, &AlbedoCurve::<f64>::default(), 0.0, c).view).fold(0.0, f64::max)
 }

@@ -1,7 +1,7 @@
 //! The table of a solved scale, and how evaluation reads it.
 
 use crate::lobes::Rgb;
-use crate::optics::{Lift, Over, Real, Scalar, array};
+use crate::optics::{Over, Scalar, array};
 
 /// s over μ = x⁴ at uniform x, for a row per weight and parameter of the top.
 #[derive(Clone, Debug, PartialEq)]
