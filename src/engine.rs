@@ -4,6 +4,7 @@
 //! parameters set becomes a material, and only then are the albedo tables baked, for the lobes that are left. A
 //! material is shared between threads and shaded point by point; shading never bakes.
 
+mod baked;
 mod error;
 mod owned;
 mod parts;
@@ -14,15 +15,14 @@ pub use crate::ir::ShadeError;
 pub use error::{Error, Place, ScriptError};
 pub use owned::OwnedBsdf;
 
+use self::baked::Baked;
 use crate::Globals;
 use crate::albedo::Precision;
-use crate::closure::balance::Construction;
 use crate::closure::{
-    Balance, Balancer, Bsdf, Builder, ClosureTree, Curves, Layering, LayeringRule, TableCache, Tables, TintRule,
-    flatten, flatten_into,
+    Balance, Bsdf, Builder, ClosureTree, Layering, LayeringRule, TableCache, Tables, TintRule, flatten, flatten_into,
 };
 use crate::diag::Diagnostic;
-use crate::ir::{self, Batch, CheckedShader, GlobalVar, Host, ParamDecl, Program, Value};
+use crate::ir::{self, Batch, CheckedShader, Host, ParamDecl, Program, Value};
 use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
 use crate::lobes::registry::{Build, ClosureParams, Form};
 use crate::lobes::subsurface::{self, SubsurfaceParams};
@@ -439,13 +439,17 @@ impl Material {
         wo: Vec3,
         scratch: &'s mut Scratch<'m>,
     ) -> Result<&'s Bsdf<'m>, ShadeError> {
-        let globals = Globals { i: -wo, ..*globals };
         let Scratch { tree, bsdf } = scratch;
+        let Baked { curves, balance, plan, .. } = &self.inner.tables;
+        if let Some(plan) = plan {
+            plan.turn(globals, V3::from_f32(wo.to_array()), curves, bsdf);
+            return Ok(bsdf);
+        }
+        let globals = Globals { i: -wo, ..*globals };
         let shaded = self.inner.program.shade(&globals, tree);
         if shaded.is_err() {
             tree.clear();
         }
-        let Baked { curves, balance, .. } = &self.inner.tables;
         let tables = Tables { curves, balance: balance.as_ref() };
         flatten_into(tree, &globals, V3::from_f32(wo.to_array()), self.engine().layering, tables, bsdf)?;
         shaded.map(|()| &*bsdf)
@@ -484,6 +488,14 @@ impl Material {
         wo: V3<S>,
         tables: &'m Baked<S>,
     ) -> Result<Bsdf<'m, S>, ShadeError> {
+        if let Some(plan) = &tables.plan {
+            // Written in place: a BSDF is too large to pass around.
+            let mut shaded = Ok(Bsdf::black());
+            if let Ok(bsdf) = &mut shaded {
+                plan.turn(globals, wo, &tables.curves, bsdf);
+            }
+            return shaded;
+        }
         let i = wo.map(|x| -x.to_f32());
         let globals = Globals { i: Vec3::new(i.x, i.y, i.z), ..*globals };
         // Written in place: a tree with room for a typical material is too large to pass around.
@@ -518,52 +530,4 @@ impl Material {
     pub fn table_bytes(&self) -> usize {
         self.inner.tables.bytes() + self.inner.reference.get().map_or(0, Baked::bytes)
     }
-}
-
-/// What is computed once per material.
-#[derive(Debug)]
-struct Baked<S: Scalar> {
-    curves: Curves<S>,
-    balance: Option<Balance<S>>,
-    precision: Precision,
-}
-
-impl<S: Scalar> Baked<S> {
-    fn new(program: &Program, layering: Layering, precision: Precision, cache: &TableCache<S>) -> Self {
-        let mut curves = Curves::default();
-        for (index, site) in program.sites().iter().enumerate() {
-            curves.prepare(index as u32, site.kind, &site.values, precision, cache);
-        }
-        let balanced = layering.rule == LayeringRule::Balanced;
-        let balance = balanced.then(|| balance(program, layering.tint, &curves, precision));
-        Baked { curves, balance, precision }
-    }
-
-    fn bytes(&self) -> usize {
-        self.curves.bytes() + self.balance.as_ref().map_or(0, Balance::bytes)
-    }
-}
-
-/// Solves for the scales of the `balanced` rule.
-fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, precision: Precision) -> Balance<S> {
-    let balancer = Balancer::new(precision);
-    if program.is_constant() {
-        // Normals are told apart by the global they come from, so none may coincide here.
-        let globals = Globals {
-            n: Vec3::new(0.13, -0.21, 0.97),
-            ng: Vec3::new(-0.31, 0.17, 0.94),
-            dpdu: Vec3::new(0.91, 0.37, 0.19),
-            dpdv: Vec3::new(-0.41, 0.88, 0.23),
-            ..Globals::default()
-        };
-        let mut tree = ClosureTree::new();
-        // A tree beyond a budget is black here, and an error wherever it is shaded.
-        let _ = program.shade(&globals, &mut tree);
-        return balancer.solve(&tree, &globals, tint, curves);
-    }
-    // Where the view changes the tree no scale is symmetric.
-    let pairs = if program.globals().contains(&GlobalVar::I) { &[] } else { program.layer_pairs() };
-    let sites = program.sites();
-    let sites: Vec<_> = sites.iter().map(|s| Construction { kind: s.kind, values: &s.values }).collect();
-    balancer.solve_pairs(&sites, pairs, tint, curves)
 }

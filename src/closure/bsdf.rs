@@ -10,7 +10,7 @@ use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{Frame, Over, Real, Scalar, V3};
+use crate::optics::{Frame, Over, Real, Scalar, V3, rgb};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -70,7 +70,9 @@ pub(crate) struct FlatLobe<'m, S: Real> {
     pub alpha_o: S,
     /// What [`FlatStack`] is to do first.
     pub steps: u8,
-    /// Its bound is needed for every ωi.
+    /// It stands in a top.
+    pub inside: bool,
+    /// It does, and its bound is needed for every ωi.
     pub in_top: bool,
     pub delta: bool,
     /// What it is estimated to scatter for this ωo, weights and layers included.
@@ -466,6 +468,18 @@ pub(super) fn add<S: Scalar, L: Over<S>>(
 }
 
 impl<S: Scalar> FlatLobe<'_, S> {
+    /// Estimates what it scatters toward ωo, `wo` in its frame, where the layers above scale it by `scale`; `share` holds its
+    /// weight. Returns the bound there, if it stands in a top: under `view` on that side alone.
+    #[inline(always)]
+    pub(super) fn weigh(&mut self, wo: V3<S>, scale: Rgb<S>) -> Rgb<S> {
+        let [albedo, bound] = self.lobe.albedos(wo, self.curve, self.in_top);
+        self.albedo = rgb!(c => self.share[c] * scale[c] * albedo[c]);
+        let largest = self.albedo[0].max(self.albedo[1]).max(self.albedo[2]).max(S::zero());
+        // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
+        self.share[3] = largest.min(S::c(1e30));
+        if self.inside && !self.in_top { self.lobe.view_bound(wo, self.curve) } else { bound }
+    }
+
     /// The bound at a direction, if it is asked for.
     pub(super) fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
         if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }

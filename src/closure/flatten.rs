@@ -141,7 +141,8 @@ impl<S: Scalar> Curves<S> {
     }
 
     /// The curve of a site and what else is known of it.
-    fn at(&self, site: u32) -> (&AlbedoCurve<S>, Option<&Site<S>>) {
+    #[inline(always)]
+    pub(super) fn at(&self, site: u32) -> (&AlbedoCurve<S>, Option<&Site<S>>) {
         match self.sites.get(site as usize) {
             Some(Known { curve, lobe }) => (curve.as_deref().unwrap_or(&self.none), lobe.as_ref()),
             None => (&self.none, None),
@@ -408,6 +409,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             weight_in_top: w.in_top,
             alpha_o: self.flat.alpha_o,
             steps: self.flat.steps,
+            inside: w.inside,
             in_top: w.inside && !view,
             delta: class == LobeClass::Delta,
             albedo: [S::zero(); 3],
@@ -421,13 +423,8 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
             self.emission(w, scale);
             return;
         }
-        let [albedo, bound] = l.lobe.albedos(wo, curve, w.inside && !view);
-        l.albedo = std::array::from_fn(|c| w.total[c] * scale[c] * albedo[c]);
-        let largest = l.albedo[0].max(l.albedo[1]).max(l.albedo[2]).max(S::zero());
-        // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
-        l.share[3] = largest.min(S::c(1e30));
+        let bound = l.weigh(wo, scale);
         if w.inside {
-            let bound = if view { l.lobe.view_bound(wo, curve) } else { bound };
             self.stack.lobe(first(w.in_top), bound);
         }
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {

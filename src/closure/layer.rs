@@ -99,9 +99,7 @@ impl<L: Real> FlatStack<L> {
                 self.scale = L::one();
             }
             if steps & step::MIDDLE != 0 {
-                let [r, g, b, _] = self.bound;
-                let alpha_i: [L; 1] = alpha(TintRule::Largest, [r, g, b]);
-                let [s] = scale(rule, [alpha_o], alpha_i);
+                let [s] = scale(rule, [alpha_o], [self.alpha()]);
                 self.scale *= s;
             }
             if steps & step::BEGIN != 0 {
@@ -109,6 +107,14 @@ impl<L: Real> FlatStack<L> {
             }
         }
         self.scale
+    }
+
+    /// α of the top that is complete.
+    #[inline(always)]
+    pub fn alpha(&self) -> L {
+        let [r, g, b, _] = self.bound;
+        let [alpha] = alpha(TintRule::Largest, [r, g, b]);
+        alpha
     }
 
     /// A lobe of a top: see [`LayerStack::lobe`].

@@ -13,7 +13,9 @@ use crate::optics::{Scalar, V3};
 #[derive(Clone, Debug)]
 pub(super) struct Site<S: Scalar> {
     kind: LobeKind,
-    /// Its block, and which bits of each slot count: none of a direction's, which shading may change.
+    /// Its block; 0 where a direction's slots are.
+    values: Vec<f32>,
+    /// The block's bits, and which bits of each slot count: none of a direction's, which shading may change.
     block: Vec<(u32, u32)>,
     /// Its color, [`LobeKind::weight`]; `None` if white.
     pub tint: Option<Rgb32>,
@@ -39,7 +41,8 @@ impl<S: Scalar> Site<S> {
         let lobe = AnyLobe::new(kind, &values, above, curve);
         let weight = kind.weight(&values);
         let tint = (weight != [1.0; 3]).then_some(weight);
-        Some(Site { kind, block, tint, stand: Stand::of(kind, &values), class: kind.class(), lobe })
+        let stand = Stand::of(kind, &values);
+        Some(Site { kind, values, block, tint, stand, class: kind.class(), lobe })
     }
 
     /// The same with another table's numbers.
@@ -53,6 +56,11 @@ impl<S: Scalar> Site<S> {
     pub fn is_of(&self, kind: LobeKind, values: &[f32]) -> bool {
         let differs = |(value, (bits, counts)): (&f32, &(u32, u32))| (value.to_bits() ^ bits) & counts;
         self.kind == kind && values.iter().zip(&self.block).map(differs).fold(0, |all, d| all | d) == 0
+    }
+
+    /// Its parameters; 0 for directions.
+    pub fn values(&self) -> &[f32] {
+        &self.values
     }
 
     /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters.

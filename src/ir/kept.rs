@@ -17,6 +17,8 @@ pub struct Kept {
     tree: ClosureTree,
     /// The first of three slots, and the direction they hold.
     directions: Vec<(u32, GlobalVar)>,
+    /// The same by site, slots counted within the block.
+    of_site: Vec<Vec<(u32, GlobalVar)>>,
 }
 
 impl Kept {
@@ -42,7 +44,19 @@ impl Kept {
             .lobe_slots()
             .flat_map(|(site, slots)| of_site[site as usize].iter().map(move |(slot, global)| (slots + slot, *global)))
             .collect();
-        Ok(Kept { id: LAST.fetch_add(1, Ordering::Relaxed) + 1, tree, directions })
+        Ok(Kept { id: LAST.fetch_add(1, Ordering::Relaxed) + 1, tree, directions, of_site })
+    }
+
+    /// The global that the direction of a site is read from which begins at `slot` of its block; `None` if it is always the
+    /// same.
+    pub fn source(&self, site: u32, slot: usize) -> Option<GlobalVar> {
+        let of_site = self.of_site.get(site as usize)?;
+        of_site.iter().find(|(s, _)| *s as usize == slot).map(|(_, global)| *global)
+    }
+
+    /// The tree, with the directions of one point.
+    pub fn tree(&self) -> &ClosureTree {
+        &self.tree
     }
 
     /// Makes `tree` this tree at a shading point.
