@@ -9,7 +9,7 @@ use super::layer::{FlatStack, LayerStack, TintRule};
 use crate::albedo::AlbedoCurve;
 use crate::lobes::host::Host;
 use crate::lobes::{Evaluated, Lobe, LobeVisitor};
-use crate::optics::{F32x8, Lanes, Lift, V3, dispatch};
+use crate::optics::{F32x8, Lanes, Lift, V3, array, dispatch};
 
 /// How many layers may be open at once for directions to be worked on side by side.
 const DEPTH: usize = 4;
@@ -89,8 +89,7 @@ impl<L: Lanes> Block<L> {
 
     #[inline(always)]
     fn store(&self, out: &mut [Eval; LANES]) {
-        let [r, g, b, pdf] = self.sum;
-        let rows = L::store([finite(r), finite(g), finite(b), pdf]);
+        let rows = L::store(array(|k| finite(self.sum[k])));
         for i in 0..LANES {
             let [r, g, b, pdf] = rows[i];
             out[i] = Eval { f_cos: [r, g, b], pdf };
@@ -217,7 +216,7 @@ impl<'a, 'm, L: Lanes> Deep<'a, 'm, L> {
     fn go_on(&mut self, blocks: &mut [Block<L>]) {
         let bsdf = self.bsdf;
         let stacks = &mut self.stacks[..blocks.len()];
-        for op in &bsdf.ops[self.next..] {
+        for op in &bsdf.ops()[self.next..] {
             self.next += 1;
             match *op {
                 Op::Lobe => break,

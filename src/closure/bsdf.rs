@@ -10,7 +10,7 @@ use super::parts::{Cosine, Signal};
 use super::tree::MAX_LAYERS;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{Frame, Over, Real, Scalar, V3, rgb};
+use crate::optics::{Frame, Over, Real, Scalar, V3, array, rgb};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -115,6 +115,8 @@ pub struct Bsdf<'m, S: Real = f32> {
     /// Whether [`FlatStack`] will do for its layers, as far as the tree goes.
     pub(super) flat: bool,
     pub(crate) ops: SmallVec<[Op; 32]>,
+    /// In place of them, for a tree that was written out before.
+    pub(super) planned_ops: &'m [Op],
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
     /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
     pub(super) balanced: SmallVec<[Option<Balanced<'m, S>>; 8]>,
@@ -135,6 +137,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             depth: 0,
             flat: true,
             ops: SmallVec::new(),
+            planned_ops: &[],
             lobes: SmallVec::new(),
             balanced: SmallVec::new(),
             layers: SmallVec::new(),
@@ -148,12 +151,19 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     pub(super) fn reset(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
         (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
         self.flat = true;
-        self.ops.clear();
-        self.lobes.clear();
-        self.balanced.clear();
-        self.layers.clear();
-        self.frames.clear();
+        self.planned_ops = &[];
+        empty(&mut self.ops);
+        empty(&mut self.lobes);
+        empty(&mut self.balanced);
+        empty(&mut self.layers);
+        empty(&mut self.frames);
         self.emission = [S::zero(); 3];
+        empty(&mut self.signals);
+    }
+
+    /// The tree written out.
+    pub(crate) fn ops(&self) -> &[Op] {
+        if self.planned_ops.is_empty() { &self.ops } else { self.planned_ops }
     }
 
     /// Turns estimated albedos into probabilities and drops nothing.
@@ -190,13 +200,14 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
                 self.eval_deep(wi, &mut sum);
             }
         }
-        let [r, g, b, pdf] = sum.all;
-        (Eval { f_cos: [finite(r), finite(g), finite(b)], pdf }, sum.pdf)
+        // All four alike, so that they are written as one.
+        let [r, g, b, pdf] = array(|k| finite(sum.all[k]));
+        (Eval { f_cos: [r, g, b], pdf }, sum.pdf)
     }
 
     /// Memory in use: the parts a walk touches, not the room kept for more lobes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.ops)
+        size_of_val(self.ops())
             + size_of_val(&*self.lobes)
             + size_of_val(&*self.balanced)
             + size_of_val(&*self.layers)
@@ -379,7 +390,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         let mut frame = u32::MAX;
         let mut local = wi;
         let (lobes, layers, frames, balanced) = (&*self.lobes, &*self.layers, &*self.frames, &*self.balanced);
-        for op in &*self.ops {
+        for op in self.ops() {
             match *op {
                 Op::Lobe => {
                     let l = &lobes[index];
@@ -483,6 +494,16 @@ impl<S: Scalar> FlatLobe<'_, S> {
     /// The bound at a direction, if it is asked for.
     pub(super) fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
         if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }
+    }
+}
+
+/// Empties a list, keeping what memory it has; `clear` goes over every entry.
+#[inline(always)]
+fn empty<A: smallvec::Array>(list: &mut SmallVec<A>) {
+    if list.spilled() {
+        list.clear();
+    } else {
+        *list = SmallVec::new();
     }
 }
 

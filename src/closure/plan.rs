@@ -18,15 +18,28 @@ use glam::Vec3;
 pub enum Direction {
     /// It is always this.
     Fixed(Vec3),
-    /// The shading point has it.
-    Read(fn(&Globals) -> Vec3),
+    /// [`Globals::n`].
+    Normal,
+    /// [`Globals::ng`].
+    Geometric,
+    /// [`Globals::dpdu`].
+    AlongU,
+    /// [`Globals::dpdv`].
+    AlongV,
+    /// [`Globals::p`].
+    Position,
 }
 
 impl Direction {
+    #[inline(always)]
     fn at(self, globals: &Globals) -> Vec3 {
         match self {
             Direction::Fixed(v) => v,
-            Direction::Read(read) => read(globals),
+            Direction::Normal => globals.n,
+            Direction::Geometric => globals.ng,
+            Direction::AlongU => globals.dpdu,
+            Direction::AlongV => globals.dpdv,
+            Direction::Position => globals.p,
         }
     }
 }
@@ -94,18 +107,18 @@ impl<S: Scalar> Plan<S> {
         };
         let lobes = bsdf.lobes.iter().map(&mut planned).collect::<Option<Vec<_>>>()?;
         let layers = bsdf.layers.iter().map(|l| l.weight).collect();
-        let (layering, depth, ops) = (bsdf.layering, bsdf.depth, bsdf.ops.to_vec());
+        let (layering, depth, ops) = (bsdf.layering, bsdf.depth, bsdf.ops().to_vec());
         (frames.len() == bsdf.frames.len()).then_some(Plan { layering, depth, frames, lobes, layers, ops })
     }
 
     /// The BSDF at a point, seen from `wo` (world space, any length), into memory that is used again.
-    pub(crate) fn turn<'m>(&self, globals: &Globals, wo: V3<S>, curves: &'m Curves<S>, bsdf: &mut Bsdf<'m, S>) {
+    pub(crate) fn turn<'m>(&'m self, globals: &Globals, wo: V3<S>, curves: &'m Curves<S>, bsdf: &mut Bsdf<'m, S>) {
         let zero = V3::new(S::zero(), S::zero(), S::zero());
         let vector = |v: Vec3| V3::from_f32(v.to_array());
         let wo = frame::normalize(wo).unwrap_or(zero);
         let ng = frame::normalize(vector(globals.ng)).unwrap_or(zero);
         bsdf.reset(wo, ng, self.layering, self.depth);
-        bsdf.ops.extend_from_slice(&self.ops);
+        bsdf.planned_ops = &self.ops;
         for axes in &self.frames {
             let n = axes.normal.at(globals);
             let n = if globals.backfacing && axes.between_media { -n } else { n };

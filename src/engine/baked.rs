@@ -64,17 +64,23 @@ fn planned<S: Scalar>(program: &Program, layering: Layering, curves: &Curves<S>)
     let bsdf = flatten(&tree, &globals, V3::from_f32(globals.n.to_array()), layering, curves).ok()?;
     Plan::of(&bsdf, curves, |site| {
         let (_, kind, values) = kept.tree().lobes().find(|l| l.0 == site)?;
-        let direction = |slot: Option<usize>, default: fn(&Globals) -> Vec3| {
-            let Some(slot) = slot else { return Some(Direction::Read(default)) };
+        let direction = |slot: Option<usize>, default: Direction| {
+            let Some(slot) = slot else { return Some(default) };
             match kept.source(site, slot) {
-                Some(global) => global.direction().map(Direction::Read),
+                Some(GlobalVar::P) => Some(Direction::Position),
+                Some(GlobalVar::N) => Some(Direction::Normal),
+                Some(GlobalVar::Ng) => Some(Direction::Geometric),
+                Some(GlobalVar::DPdu) => Some(Direction::AlongU),
+                Some(GlobalVar::DPdv) => Some(Direction::AlongV),
+                // What depends on the viewer.
+                Some(_) => None,
                 None => Some(Direction::Fixed(Vec3::from_slice(values.get(slot..slot + 3)?))),
             }
         };
         let spec = kind.spec();
         Some(Axes {
-            normal: direction(spec.normal_slot(), |g| g.n)?,
-            tangent: direction(spec.tangent_slot(), |g| g.dpdu)?,
+            normal: direction(spec.normal_slot(), Direction::Normal)?,
+            tangent: direction(spec.tangent_slot(), Direction::AlongU)?,
             between_media: kind.between_media(values),
         })
     })

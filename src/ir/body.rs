@@ -78,20 +78,6 @@ macro_rules! globals {
     };
 }
 
-impl GlobalVar {
-    /// How a direction is read that does not depend on the viewer; `None` for everything else.
-    pub fn direction(self) -> Option<fn(&Globals) -> glam::Vec3> {
-        match self {
-            GlobalVar::P => Some(|g| g.p),
-            GlobalVar::N => Some(|g| g.n),
-            GlobalVar::Ng => Some(|g| g.ng),
-            GlobalVar::DPdu => Some(|g| g.dpdu),
-            GlobalVar::DPdv => Some(|g| g.dpdv),
-            _ => None,
-        }
-    }
-}
-
 globals! {
     P "P" Point |g| g.p.to_array().map(f32::to_bits),
     N "N" Normal |g| g.n.to_array().map(f32::to_bits),

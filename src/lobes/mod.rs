@@ -210,6 +210,24 @@ pub struct Evaluated<L> {
     pub bound: Rgb<L>,
 }
 
+/// See [`AnyLobe::turn`].
+#[inline(always)]
+fn turned<S: Real, T: Lobe<S>>(
+    lobe: &T,
+    wo: V3<S>,
+    curve: &AlbedoCurve<S::Entry>,
+    to: &mut AnyLobe<S>,
+    any: impl Fn(T) -> AnyLobe<S>,
+) -> bool {
+    match lobe.toward(wo, curve) {
+        Some(turned) => {
+            *to = any(turned);
+            true
+        }
+        None => false,
+    }
+}
+
 #[inline(always)]
 fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
     [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
@@ -320,15 +338,18 @@ macro_rules! lobes {
             }
             /// See [`Lobe::toward`]. Written in place, because there is room for the largest lobe. False, and nothing is
             /// written, if there is no shorter way than [`new`](Self::new).
+            #[inline(always)]
             pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
                 match self {
-                    $( AnyLobe::$Lobe(l) => {
-                        let turned = Lobe::<S>::toward(l, wo, curve);
-                        if let Some(turned) = turned {
-                            *to = AnyLobe::$Lobe(turned);
-                        }
-                        turned.is_some()
-                    } )*
+                    AnyLobe::Diffuse(l) => turned(l, wo, curve, to, AnyLobe::Diffuse),
+                    AnyLobe::Sheen(l) => turned(l, wo, curve, to, AnyLobe::Sheen),
+                    _ => self.turn_apart(wo, curve, to),
+                }
+            }
+            #[inline(never)]
+            fn turn_apart(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
+                match self {
+                    $( AnyLobe::$Lobe(l) => turned(l, wo, curve, to, AnyLobe::$Lobe), )*
                     AnyLobe::Host(_) => false,
                 }
             }

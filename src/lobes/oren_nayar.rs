@@ -32,6 +32,8 @@ pub struct OrenNayar<S> {
     a: S,
     b: S,
     wo: V3<S>,
+    /// Whether E, which is highest at the horizon, exceeds 1 there.
+    gains: bool,
     /// max(1, E(ωo)).
     excess: S,
     /// 1/π on the normal's side, else 0.
@@ -89,18 +91,21 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
 
     fn new(params: &OrenNayarParams, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Self {
         let var = S::from_f32(params.sigma).sq();
+        let variance = f64::from(params.sigma).powi(2);
         let lobe = OrenNayar {
             a: S::one() - S::c(0.5) * var / (var + S::c(0.33)),
             b: S::c(0.45) * var / (var + S::c(0.09)),
             wo,
+            // A + B/2, and a little.
+            gains: 0.225 / (variance + 0.09) > 0.4999 / (variance + 0.33),
             excess: S::one(),
             scale: Self::on_side(wo.z, S::c(FRAC_1_PI)),
         };
-        OrenNayar { excess: lobe.raw_albedo(wo).max(S::one()), ..lobe }
+        OrenNayar { excess: if lobe.gains { lobe.raw_albedo(wo).max(S::one()) } else { S::one() }, ..lobe }
     }
 
     fn toward(&self, wo: V3<S>, _: &AlbedoCurve<S::Entry>) -> Option<Self> {
-        let excess = self.raw_albedo(wo).max(S::one());
+        let excess = if self.gains { self.raw_albedo(wo).max(S::one()) } else { S::one() };
         Some(OrenNayar { wo, excess, scale: Self::on_side(wo.z, S::c(FRAC_1_PI)), ..*self })
     }
 
@@ -110,8 +115,8 @@ impl<S: Real> Lobe<S> for OrenNayar<S> {
         // sin θi·sin θo·cos Δφ over the larger cosine is sin α·tan β·cos Δφ.
         let across = (wo.x * wi.x + wo.y * wi.y).max(L::zero());
         let retro = across / wo.z.max(wi.z).max(L::c(1e-6));
-        let excess = self.raw_albedo(wi).max(L::lift(self.excess));
-        let f = L::lift(self.scale) * L::lift(self.b).mul_add(retro, L::lift(self.a)) / excess;
+        let f = L::lift(self.scale) * L::lift(self.b).mul_add(retro, L::lift(self.a));
+        let f = if self.gains { f / self.raw_albedo(wi).max(L::lift(self.excess)) } else { f };
         [Self::on_side(wi.z, f); 3]
     }
 

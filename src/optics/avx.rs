@@ -455,7 +455,9 @@ mod tests {
                 keep(x.abs().powf(y));
                 let angle = z.mul_add(L::c(7.0), L::c(-3.0));
                 let (sin, cos) = angle.sin_cos();
-                [sin, cos, z.atan2(angle), angle.atan2(z), L::quartic(&table, 599.0, z)].into_iter().for_each(&mut keep);
+                [sin, cos, z.atan2(angle), angle.atan2(z), L::quartic(&table, 599.0, z)]
+                    .into_iter()
+                    .for_each(&mut keep);
                 let (row, t) = L::octaves::<32, 4, 512, 4>(&cubics, z).expect("single precision");
                 keep(octaves::cubic(row, t));
                 keep(L::gather(&table, (z * L::c(599.0)).whole()));

@@ -18,6 +18,7 @@ impl<S: Scalar> Frame<S> {
     ///
     /// A zero or non-finite `n` is replaced by `fallback_n`, and that by +z; an `along` that is zero, non-finite or
     /// parallel to the normal by `fallback_along`, and that by any tangent.
+    #[inline(always)]
     pub fn new(n: V3<S>, fallback_n: V3<S>, along: V3<S>, fallback_along: V3<S>) -> Self {
         let n = normalize(n).or_else(|| normalize(fallback_n)).unwrap_or(V3::new(S::zero(), S::zero(), S::one()));
         let t = tangent(n, along).or_else(|| tangent(n, fallback_along)).unwrap_or_else(|| any_tangent(n));
@@ -45,6 +46,7 @@ pub fn normalize<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
 }
 
 /// Whether a squared length is far from where squares over- or underflow; never for NaN.
+#[inline(always)]
 fn is_ordinary<S: Scalar>(square: S) -> bool {
     square.gt(S::c(1e-20)) & square.lt(S::c(1e20))
 }
