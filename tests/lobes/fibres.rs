@@ -1,8 +1,6 @@
 //! The lobes that follow a thread: against reference values, at the thread's poles, and how well they are sampled.
 
-mod common;
-
-use common::{Stack, lobe, table};
+use crate::common::{Stack, block, lobe, table};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;
@@ -259,7 +257,7 @@ fn cloths_are_sampled_better_than_uniformly() {
 /// Baking is part of compiling a material.
 #[test]
 fn tables_are_small_and_quick() {
-    let known = |kind: LobeKind| common::block(kind, |_| None).into_iter().map(Some).collect::<Vec<_>>();
+    let known = |kind: LobeKind| block(kind, |_| None).into_iter().map(Some).collect::<Vec<_>>();
     let mut cases = vec![
         ("fabric", LobeKind::Fabric, known(LobeKind::Fabric)),
         ("thread", LobeKind::Thread, known(LobeKind::Thread)),

@@ -1,9 +1,7 @@
 //! The bounds of the lobes that follow a thread, at random directions: with all parameters known, and with tables that
 //! were baked without knowing some.
 
-mod common;
-
-use common::{Stack, block};
+use crate::common::{Stack, block};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
 use overcoat::closure::ClosureTree;

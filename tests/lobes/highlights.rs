@@ -1,8 +1,6 @@
 //! Phong's and Ward's highlights: bounded at every width, tables true, samples as they say.
 
-mod common;
-
-use common::{Stack, lobe, turned};
+use crate::common::{Stack, lobe, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;

@@ -1,8 +1,6 @@
 //! The sheen against its double-precision reference tables.
 
-mod common;
-
-use common::{Stack, at, lobe, table};
+use crate::common::{Stack, at, lobe, table};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
 use overcoat::closure::ClosureTree;

@@ -1,8 +1,6 @@
 //! Rough surfaces: nothing is lost at any roughness, from either medium, and smooth ones are the limit.
 
-mod common;
-
-use common::{Stack, lobe, turned};
+use crate::common::{Stack, block, lobe, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;
@@ -151,7 +149,7 @@ fn a_film_on_glass_divides_nearly_all_light() {
 #[test]
 fn a_colored_boundary_reflects_one_color_and_passes_the_rest() {
     let mut tree = ClosureTree::new();
-    let mut values = common::block(LobeKind::GeneralizedSchlick, |p| p.name.starts_with("roughness").then_some(1e-4));
+    let mut values = block(LobeKind::GeneralizedSchlick, |p| p.name.starts_with("roughness").then_some(1e-4));
     let slot = |name: &str| LobeKind::GeneralizedSchlick.spec().slot_of(name).expect("there");
     values[slot("transmission_tint")..][..3].fill(1.0);
     values[slot("f0")..][..3].copy_from_slice(&[0.3, 0.1, 0.02]);

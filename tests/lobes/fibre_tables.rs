@@ -1,9 +1,7 @@
 //! The tables of the lobes that follow a thread: the standard tier's against the reference tier's, and both against the
 //! albedo as the audit measures it.
 
-mod common;
-
-use common::{Stack, block};
+use crate::common::{Stack, block};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
 use overcoat::closure::ClosureTree;

@@ -1,8 +1,6 @@
 //! The sheen models and the velvet against double-precision reference tables.
 
-mod common;
-
-use common::{Stack, at, lobe, table};
+use crate::common::{Stack, at, lobe, table};
 use overcoat::albedo::quadrature::Rule;
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::{Side, Tolerance, albedo};

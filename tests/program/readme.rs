@@ -16,7 +16,7 @@ fn its_commands_run() {
     let mut pictures = 0;
     for line in readme().lines() {
         let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
-        // This one does not end by itself; `tests/studio.rs` runs it.
+        // This one does not end by itself; `tests/program/studio.rs` runs it.
         if arguments.starts_with("studio ") {
             continue;
         }
@@ -35,7 +35,7 @@ fn its_commands_run() {
     assert!(pictures >= 2, "{pictures} pictures");
 }
 
-/// Each host is built and run by one command: this runs those that need only cargo, `tests/capi.rs` the one for C, `.ci/run`
+/// Each host is built and run by one command: this runs those that need only cargo, `tests/hosts/capi.rs` the one for C, `.ci/run`
 /// the one for Python.
 #[test]
 fn its_hosts_run() {

@@ -1,9 +1,7 @@
 //! How well lobes are sampled: chi-square over roughness and angle, and the variance of f·cos/pdf beside that of
 //! uniform directions. Run with `--nocapture` for the tables.
 
-mod common;
-
-use common::{Stack, at, block, lobe};
+use crate::common::{Stack, at, block, lobe};
 use overcoat::albedo::Precision;
 use overcoat::albedo::quadrature::Rule;
 use overcoat::audit::chi2;
