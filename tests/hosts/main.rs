@@ -6,4 +6,5 @@ mod common;
 mod capi;
 mod capi_header;
 mod closures;
+mod listings;
 mod renderer;

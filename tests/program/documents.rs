@@ -1,145 +1,153 @@
-//! What the README says can be done can be done.
+//! What the README and the pages of docs say is so: their scripts compile, their links lead somewhere, the commands and
+//! flags they name exist. What they show on a line of its own is run by `commands.rs`.
 #![cfg(feature = "cli")]
 
-use std::path::Path;
-use std::process::Command;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
-fn readme() -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("README.md")
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-#[test]
-fn its_commands_run() {
-    let folder = tempfile::tempdir().expect("a folder");
-    std::os::unix::fs::symlink(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), folder.path().join("examples"))
-        .expect("linked");
-    let mut pictures = 0;
-    for line in readme().lines() {
-        let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
-        // This one does not end by itself; `tests/program/studio.rs` runs it.
-        if arguments.starts_with("studio ") {
-            continue;
-        }
-        let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
-        // The same, but quick.
-        command.current_dir(folder.path()).args(arguments.split_whitespace()).args(["--spp", "1"]);
-        if !arguments.contains("--size") {
-            command.args(["--size", "32"]);
-        }
-        let output = command.output().expect("the program starts");
-        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        let file = arguments.split_whitespace().skip_while(|a| *a != "-o").nth(1).expect("an output");
-        image::open(folder.path().join(file)).expect("a picture");
-        pictures += 1;
-    }
-    assert!(pictures >= 2, "{pictures} pictures");
+/// A document, and what it says.
+pub struct Page {
+    pub path: PathBuf,
+    pub text: String,
 }
 
-/// Each host is built and run by one command: this runs those that need only cargo, `tests/hosts/capi.rs` the one for C, `.ci/run`
-/// the one for Python.
-#[test]
-fn its_hosts_run() {
-    let (root, folder) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().expect("a folder"));
-    let mut hosts = 0;
-    for line in readme().lines() {
-        let Some(arguments) = line.strip_prefix("    cargo run --release --example ") else { continue };
-        let (name, arguments) = arguments.split_once(" -- ").expect("arguments");
-        let mut command = Command::new(env!("CARGO"));
-        command.args(["run", "--quiet", "--manifest-path"]).arg(root.join("Cargo.toml")).args([
-            "--example",
-            name,
-            "--",
-        ]);
-        command.args(arguments.split_whitespace()).args(["--spp", "2", "--size", "32"]).current_dir(folder.path());
-        let output = command.output().expect("cargo starts");
-        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        let file = arguments.split_whitespace().skip_while(|a| *a != "-o").nth(1).expect("an output");
-        let picture = image::open(folder.path().join(file)).expect("a picture").to_rgb8();
-        let light = picture.pixels().filter(|p| p.0.iter().any(|c| *c > 40)).count();
-        assert!(light > 400, "{light} of {} pixels are not dark", 32 * 32);
-        hosts += 1;
-    }
-    assert!(hosts >= 1);
-    let ci = std::fs::read_to_string(root.join(".ci/run")).expect(".ci/run");
-    let python =
-        readme().lines().find_map(|l| l.strip_prefix("    pip install ").map(str::to_owned)).expect("a command");
-    let script =
-        python.split("python ").nth(1).expect("a script").split_whitespace().next().expect("a path").to_owned();
-    assert!(root.join(&script).exists() && ci.contains(&script), "{script}");
-    assert!(readme().contains("    sh examples/c/run.sh\n") && root.join("examples/c/run.sh").exists());
+/// What users read.
+pub fn pages() -> Vec<Page> {
+    let docs = std::fs::read_dir(root().join("docs")).expect("docs").map(|e| e.expect("an entry").path());
+    let mut paths: Vec<PathBuf> = docs.filter(|p| p.extension().is_some_and(|e| e == "md")).collect();
+    paths.extend(["README.md", "python/README.md"].map(|name| root().join(name)));
+    paths.sort();
+    paths.into_iter().map(|path| Page { text: std::fs::read_to_string(&path).expect("a page"), path }).collect()
 }
 
-/// In the pages that show commands; `# 3` at the end of a line is the exit status it says.
+pub fn overcoat(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
+    command.args(arguments);
+    command
+}
+
+fn help(arguments: &[&str]) -> String {
+    let output = overcoat(arguments).arg("--help").output().expect("the program starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The names of all commands.
+fn commands() -> Vec<String> {
+    let help = help(&[]);
+    let listed = help.split("Commands:").nth(1).and_then(|t| t.split("Options:").next()).expect("commands");
+    let lines = listed.lines().filter(|l| l.starts_with("  ") && !l.starts_with("   "));
+    lines.map(|l| l.split_whitespace().next().expect("a name").to_owned()).filter(|n| n != "help").collect()
+}
+
+/// What stands between backticks, blocks of code left out.
+fn quoted(text: &str) -> Vec<String> {
+    let prose: Vec<&str> = text.split("```").step_by(2).collect();
+    prose.iter().flat_map(|p| p.split('`').skip(1).step_by(2)).map(|q| q.replace("\\|", "|")).collect()
+}
+
+/// A script's block begins like a shader: blocks of C do not.
 #[test]
-fn the_commands_of_the_pages_run() {
-    let (root, folder) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().expect("a folder"));
-    for page in ["audit.md", "guide.md"] {
-        let text = std::fs::read_to_string(root.join("docs").join(page)).expect(page);
-        let mut commands = 0;
-        for line in text.lines() {
-            let Some(arguments) = line.strip_prefix("    cargo run --release -- ") else { continue };
-            let (arguments, status) = arguments.split_once("  # ").unwrap_or((arguments, "0"));
-            let mut command = Command::new(env!("CARGO_BIN_EXE_overcoat"));
-            command.current_dir(root);
-            for argument in arguments.split_whitespace() {
-                // Pictures go elsewhere.
-                match argument.ends_with(".png") {
-                    true => command.arg(folder.path().join(argument)),
-                    false => command.arg(argument),
-                };
+fn scripts_compile_without_a_warning() {
+    let mut scripts = 0;
+    for Page { path, text } in pages() {
+        for block in text.split("```c\n").skip(1) {
+            let script = block.split("```").next().expect("an end");
+            if !script.starts_with("surface ") {
+                continue;
             }
-            let output = command.output().expect("the program starts");
-            let message = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(output.status.code(), status.parse().ok(), "{page}: {line}: {message}");
-            assert!(output.stdout.len() + message.len() > 100 || arguments.contains(".png"), "{page}: {line}");
-            commands += 1;
+            let shader = overcoat::Engine::new().compile("page", script).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+            assert!(shader.warnings().is_empty() && shader.params().len() > 1, "{path:?}");
+            scripts += 1;
         }
-        assert!(commands >= 4, "{page}: {commands} commands");
     }
+    assert!(scripts >= 2, "{scripts}");
 }
 
 #[test]
-fn the_guides_scripts_compile_and_its_links_lead_somewhere() {
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-    let text = std::fs::read_to_string(docs.join("guide.md")).expect("docs/guide.md");
-    let script = text.split("```c\n").nth(1).and_then(|t| t.split("```").next()).expect("a script");
-    let shader = overcoat::Engine::new().compile("guide", script).expect("compiles");
-    assert!(shader.warnings().is_empty() && shader.params().len() == 2);
-    for link in text.split("](").skip(1) {
-        let target = link.split(')').next().expect("a target");
-        let heading = target.strip_prefix('#').map(|anchor| anchor.replace('-', " "));
-        let found = match heading {
-            Some(heading) => text.lines().any(|l| l.to_lowercase() == format!("## {heading}")),
-            None => docs.join(target).exists(),
+fn scripts_in_a_line_run() {
+    let mut scripts = 0;
+    for Page { path, text } in pages() {
+        for line in quoted(&text) {
+            let Some((script, arguments)) = line.split_once(" | overcoat ") else { continue };
+            let script = script.strip_prefix("echo '").and_then(|s| s.strip_suffix('\'')).expect("a script");
+            let words: Vec<&str> = arguments.split_whitespace().collect();
+            let mut program =
+                overcoat(&words).stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("the program starts");
+            program.stdin.take().expect("stdin").write_all(script.as_bytes()).expect("read");
+            assert!(program.wait().expect("ended").success(), "{path:?}: {line}");
+            scripts += 1;
+        }
+    }
+    assert!(scripts >= 1);
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut links = 0;
+    for Page { path, text } in pages() {
+        for link in text.split("](").skip(1) {
+            let target = link.split(')').next().expect("a target");
+            if target.starts_with("http") {
+                continue;
+            }
+            let found = match target.strip_prefix('#') {
+                Some(anchor) => {
+                    let heading = format!("## {}", anchor.replace('-', " "));
+                    text.lines().any(|l| l.to_lowercase() == heading)
+                }
+                None => path.with_file_name(target).exists(),
+            };
+            assert!(found, "{path:?}: {target}");
+            links += 1;
+        }
+    }
+    assert!(links > 100, "{links}");
+}
+
+#[test]
+fn the_readmes_table_names_every_command() {
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("README.md");
+    for name in commands() {
+        assert!(readme.contains(&format!("`overcoat {name} ")), "README without `{name}`");
+    }
+}
+
+/// In running text and tables, and in the script that makes the pictures: a command that was renamed, a flag that is gone.
+#[test]
+fn commands_and_flags_that_are_named_exist() {
+    let helps: Vec<(String, String)> = commands().into_iter().map(|n| (n.clone(), help(&[&n]))).collect();
+    let figures = overcoat(&["reproduce", "nowhere", "--only", "no such figure"]).output().expect("the program starts");
+    let figures = String::from_utf8(figures.stderr).expect("text");
+    let pictures = std::fs::read_to_string(root().join("docs/pictures.sh")).expect("the script");
+    let pictures = pictures.lines().filter_map(|l| Some(format!("overcoat {}", l.strip_prefix("\"$overcoat\" ")?)));
+    let named = pages().into_iter().flat_map(|p| quoted(&p.text)).chain(pictures);
+    let mut count = 0;
+    for line in named {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let about = match words[..] {
+            ["overcoat", name, ..] => {
+                let of = |(n, h): &(String, String)| (n == name).then(|| h.clone());
+                helps.iter().find_map(of).unwrap_or_else(|| panic!("no command: `{line}`"))
+            }
+            // Alone, it may be any command's; benches and tests are cargo's.
+            [flag, ..] if flag.starts_with("--") && !["--bench", "--nocapture"].contains(&flag) => {
+                helps.iter().map(|h| h.1.as_str()).collect()
+            }
+            _ => continue,
         };
-        assert!(found, "{target}");
+        for flag in words.iter().filter(|w| w.starts_with("--")) {
+            assert!(about.contains(flag), "`{line}`: no {flag}");
+        }
+        if let ["overcoat", "reproduce", _, "--only", figure] = words[..] {
+            assert!(figures.contains(figure), "`{line}`: {figures}");
+        }
+        count += 1;
     }
-}
-
-#[test]
-fn its_script_compiles_without_a_warning() {
-    let text = readme();
-    let script = text.split("```c\n").nth(1).and_then(|t| t.split("```").next()).expect("a script");
-    let shader = overcoat::Engine::new().compile("readme", script).expect("compiles");
-    assert!(shader.warnings().is_empty());
-    assert_eq!(shader.params().len(), 4);
-}
-
-#[test]
-fn its_table_names_every_command() {
-    let help = Command::new(env!("CARGO_BIN_EXE_overcoat")).arg("--help").output().expect("the program starts");
-    let help = String::from_utf8(help.stdout).expect("text");
-    let commands = help.split("Commands:").nth(1).and_then(|t| t.split("Options:").next()).expect("commands");
-    for line in commands.lines().filter(|l| l.starts_with("  ") && !l.starts_with("   ")) {
-        let name = line.split_whitespace().next().expect("a name");
-        assert!(name == "help" || readme().contains(&format!("`overcoat {name} ")), "README without `{name}`");
-    }
-}
-
-#[test]
-fn its_files_exist() {
-    for link in readme().split("](").skip(1) {
-        let target = link.split(')').next().expect("a target");
-        assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(target).exists(), "{target}");
-    }
+    assert!(count > 60, "{count}");
 }
