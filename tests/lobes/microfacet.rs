@@ -1,6 +1,6 @@
 //! Rough surfaces: nothing is lost at any roughness, from either medium, and smooth ones are the limit.
 
-use crate::common::{Stack, block, lobe, turned};
+use crate::common::{Stack, alone, block, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;
@@ -10,10 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 fn single<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Stack<S> {
-    let mut tree = ClosureTree::new();
-    let root = lobe(&mut tree, kind, set);
-    tree.set_root(root);
-    Stack::new(tree, Precision::STANDARD)
+    Stack::new(alone(kind, set), Precision::STANDARD)
 }
 
 /// What 40 000 samples carry on average: an estimate of the albedo that needs no grid, to about 0.004.
