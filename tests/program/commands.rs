@@ -49,7 +49,7 @@ const QUICKER: [(&str, &str); 4] = [
     ("--trees 1000000", "--trees 8"),
     ("--shard 1/32", "--shard 1/2"),
     ("1.json 2.json …", "1.json 2.json"),
-    ("gallery examples", "gallery examples --size 16 --spp 1"),
+    ("gallery examples", "gallery materials --size 16 --spp 1"),
 ];
 
 fn shown() -> Vec<Shown> {
