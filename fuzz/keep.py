@@ -9,7 +9,6 @@ until every place in the program that any input reached is reached.
 
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -59,10 +58,14 @@ def main():
         small = {f: p for f, p in places.items() if os.path.getsize(f) <= LONGEST}
         kept = cover(small)
         contents = {pathlib.Path(f).name: pathlib.Path(f).read_bytes() for f in kept}
-        shutil.rmtree(corpus)
-        corpus.mkdir()
+        # Written beside and renamed, and only then is the rest dropped: interrupted, it leaves more rather than less.
         for name, bytes_ in contents.items():
-            (corpus / name).write_bytes(bytes_)
+            beside = corpus.with_name(f".{name}")
+            beside.write_bytes(bytes_)
+            beside.replace(corpus / name)
+        for file in corpus.iterdir():
+            if file.name not in contents:
+                file.unlink()
         print(f"{target}: {len(kept)} of {len(places)} inputs, {sum(map(len, contents.values()))} bytes")
 
 

@@ -1,4 +1,5 @@
-//! The shape of the source: who may use whom, how long a file may get, where unsafe code may stand.
+//! The shape of the source: who may use whom, how long a file may get, where unsafe code may stand. And the tests that
+//! documents and comments name: they exist.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -148,4 +149,73 @@ fn unsafe_code_has_its_places_and_its_reasons() {
             "src/{file}: functions that do not say what they need"
         );
     }
+}
+
+/// What is read by people, and what says how tests are run, with the comments of the sources.
+fn documents() -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    for folder in ["src", "tests", "examples", "benches", "fuzz/src"] {
+        sources(&root().join(folder), &mut files);
+    }
+    let docs = std::fs::read_dir(root().join("docs")).expect("docs").map(|e| e.expect("an entry").path());
+    files.extend(docs.filter(|p| p.extension().is_some_and(|e| e == "md")));
+    let others = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "cbindgen.toml", "fuzz/Cargo.toml", ".ci/run"];
+    files.extend(others.map(|name| root().join(name)));
+    files.retain(|f| !f.ends_with("tests/tidy.rs"));
+    let read = |f: PathBuf| (f.display().to_string(), std::fs::read_to_string(f).expect("a document"));
+    files.into_iter().map(read).collect()
+}
+
+/// Programs, files of tests, and the words that pick some of a program: they are names of its files.
+#[test]
+fn tests_that_are_named_exist() {
+    let tests = root().join("tests");
+    let word = |c: char| c.is_alphanumeric() || "_/.".contains(c);
+    let mut count = 0;
+    for (file, text) in documents() {
+        for piece in text.split("--test ").skip(1) {
+            let line = piece.split(['`', '"', '\n']).next().unwrap_or("");
+            let mut words = line.split_whitespace().filter(|w| w.chars().all(|c| word(c) || c == ':'));
+            let name = words.next().expect("a name");
+            let found = tests.join(format!("{name}.rs")).exists() || tests.join(name).join("main.rs").exists();
+            assert!(found, "{file}: --test {name}");
+            for picked in words.map(|w| w.trim_end_matches("::")) {
+                assert!(tests.join(name).join(format!("{picked}.rs")).exists(), "{file}: {line}");
+            }
+            count += 1;
+        }
+        for piece in text.split("tests/").skip(1) {
+            let path: String = piece.chars().take_while(|c| word(*c)).collect();
+            let path = path.trim_end_matches('.');
+            assert!(!path.ends_with(".rs") || tests.join(path).exists(), "{file}: tests/{path}");
+            count += 1;
+        }
+    }
+    assert!(count > 60, "{count}");
+}
+
+/// `file.rs`: `name`, `name` – of tables that say which test holds what.
+#[test]
+fn tests_that_are_said_to_hold_something_exist() {
+    let mut count = 0;
+    for (file, text) in documents().into_iter().filter(|d| d.0.ends_with(".md")) {
+        for line in text.lines().filter(|l| l.starts_with('|')) {
+            let pieces: Vec<&str> = line.split('`').collect();
+            let mut source = None;
+            for k in (1..pieces.len()).step_by(2) {
+                let (before, inside, after) = (pieces[k - 1], pieces[k], pieces.get(k + 1).unwrap_or(&""));
+                if inside.ends_with(".rs") && *after == ": " {
+                    let places = [root().join(inside), root().join("src").join(inside)];
+                    let place = places.iter().find(|p| p.exists()).unwrap_or_else(|| panic!("{file}: {inside}"));
+                    source = Some((inside, std::fs::read_to_string(place).expect("source")));
+                } else if let Some((name, code)) = source.as_ref().filter(|_| [": ", ", "].contains(&before)) {
+                    assert!(code.contains(&format!("fn {inside}(")), "{file}: no `{inside}` in {name}");
+                    count += 1;
+                } else {
+                    source = None;
+                }
+            }
+        }
+    }
+    assert!(count > 20, "{count}");
 }

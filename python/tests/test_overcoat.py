@@ -174,6 +174,23 @@ def test_plots(velvet):
     assert overcoat.plot.picture(velvet, size=16, spp=1).images
 
 
+@pytest.mark.parametrize("page", ["python/README.md", "docs/embedding.md"])
+def test_listings_of_the_pages_run(page):
+    """Line by line; a remark that is a word in quotes is what the line gives."""
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    text = (pathlib.Path(__file__).parents[2] / page).read_text()
+    blocks = [rest.split("```")[0] for rest in text.split("```python\n")[1:]]
+    assert blocks
+    for block in blocks:
+        names = {"np": np, "overcoat": overcoat, "wi": sphere(8), "u": uniform(8)}
+        for line in block.splitlines():
+            code, _, remark = line.partition("#")
+            exec(code.strip(), names)
+            if remark.strip().startswith("'"):
+                assert eval(code.strip(), names) == ast.literal_eval(remark.strip())
+
+
 def test_everything_is_documented_and_typed():
     stubs = ast.parse(pathlib.Path(overcoat.__file__).with_name("_overcoat.pyi").read_text())
     typed = {node.name: node for node in stubs.body if isinstance(node, ast.ClassDef)}

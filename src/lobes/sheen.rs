@@ -23,7 +23,7 @@
 //! `exact`, not to a volume of fibres.
 //!
 //! The paper samples the hemisphere uniformly. Here all models are sampled by a transformed cosine mixed with a
-//! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/sampling.rs` prints the table).
+//! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/lobes/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};

@@ -1,7 +1,7 @@
 //! exp, ln, sin, cos and atan2 in single precision, as plain arithmetic without branches or tables.
 //!
 //! One text serves `f32` and vectors of it. Reductions follow Cody & Waite; the polynomials are minimax fits of the usual
-//! degrees (Moshier's Cephes). Errors, measured over every exponent in `tests/numbers.rs`: exp and ln 1 ulp, sin and cos
+//! degrees (Moshier's Cephes). Errors, measured over every exponent in `tests/lobes/numbers.rs`: exp and ln 1 ulp, sin and cos
 //! 7e-8 absolute for |x| ≤ 8π, atan2 3e-7 absolute.
 
 use super::Real;

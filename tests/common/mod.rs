@@ -79,6 +79,14 @@ pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> Node
     tree.lobe(kind, site, &values)
 }
 
+/// A tree of nothing but that lobe.
+pub fn alone(kind: LobeKind, set: &[(&str, f32)]) -> ClosureTree {
+    let mut tree = ClosureTree::new();
+    let root = lobe(&mut tree, kind, set);
+    tree.set_root(root);
+    tree
+}
+
 /// A parameter block: `pick` gives a value per parameter, else its default.
 pub fn block(kind: LobeKind, mut pick: impl FnMut(&ParamSpec) -> Option<f32>) -> Vec<f32> {
     let mut values = Vec::new();

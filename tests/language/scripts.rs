@@ -262,6 +262,27 @@ warning[W0501]: `Ci` is never assigned: the material is black
   |
   = help: assign a closure, for example `Ci = diffuse(N);`
 "##);
+    insta::assert_snapshot!(messages("Ci = layer(diffuse(N), 0.5);"), @r##"
+error[E0205]: `base` of `layer` is closure color, not float
+ --> velvet.osl:1:24
+  |
+1 | Ci = layer(diffuse(N), 0.5);
+  |                        ^^^ expected closure color, found float
+  |
+  = help: declared as `layer(closure color top, closure color base)`
+"##);
+    insta::assert_snapshot!(messages(&format!("Ci = {}glass(N){};", "diffuse(N) + ".repeat(99), " + diffuse(N)".repeat(99))), @r##"
+error[E0206]: unknown function `glass`
+ --> velvet.osl:1:1293
+  |
+ ::: 
+1 | ...+ diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + glass(N) + diffuse(N) + diffuse(N) + diffuse(N) + ...
+  |                                                                                    ^^^^^
+"##);
+}
+
+#[test]
+fn messages_say_what_cannot_be_read_or_does_nothing() {
     insta::assert_snapshot!(messages("float x = 1\nCi = x * diffuse(N);\nfor (x = 0; x < 2) { }"), @r##"
 error[E0107]: a `;` is missing after this
  --> velvet.osl:1:11
@@ -275,15 +296,6 @@ error[E0107]: `)` was not expected here
 3 | for (x = 0; x < 2) { }
   |                  ^ expected `;`, `,` or an operator
 "##);
-    insta::assert_snapshot!(messages("Ci = layer(diffuse(N), 0.5);"), @r##"
-error[E0205]: `base` of `layer` is closure color, not float
- --> velvet.osl:1:24
-  |
-1 | Ci = layer(diffuse(N), 0.5);
-  |                        ^^^ expected closure color, found float
-  |
-  = help: declared as `layer(closure color top, closure color base)`
-"##);
     insta::assert_snapshot!(messages("Ci = (diffuse(N) + [1);"), @r##"
 error[E0102]: expected `]` before this `)`
  --> velvet.osl:1:22
@@ -292,14 +304,6 @@ error[E0102]: expected `]` before this `)`
   |                    - ^
   |                    |
   |                    this `[` is still open
-"##);
-    insta::assert_snapshot!(messages(&format!("Ci = {}glass(N){};", "diffuse(N) + ".repeat(99), " + diffuse(N)".repeat(99))), @r##"
-error[E0206]: unknown function `glass`
- --> velvet.osl:1:1293
-  |
- ::: 
-1 | ...+ diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + diffuse(N) + glass(N) + diffuse(N) + diffuse(N) + diffuse(N) + ...
-  |                                                                                    ^^^^^
 "##);
     insta::assert_snapshot!(messages("#include \"my.h\"\nfloat x = 1;"), @r##"
 error[E0103]: unknown header `my.h`

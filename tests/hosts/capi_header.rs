@@ -20,7 +20,7 @@ fn the_header_is_fresh() {
         std::fs::write(&path, &text).expect("written");
     }
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(committed == text, "stale: OVERCOAT_BLESS=1 cargo test --features capi --test capi_header");
+    assert!(committed == text, "stale: OVERCOAT_BLESS=1 cargo test --features capi --test hosts capi_header");
     for name in [
         "oc_abi_version",
         "oc_last_error",

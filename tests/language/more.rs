@@ -1,13 +1,10 @@
 //! Corners of the language that need more than a value: parameters in parts, loops that the proof follows, loops that
 //! run at the point, random programs of loops and functions, and a replay of the corpus cut and joined.
 
-#[path = "common/programs.rs"]
-mod programs;
-
+use crate::programs::{LIBRARY, statement};
 use overcoat::closure::ClosureTree;
 use overcoat::ir::{self, ShadeError, Value};
 use overcoat::{Engine, Globals};
-use programs::{LIBRARY, statement};
 use proptest::prelude::*;
 
 fn weight(script: &str, set: &[(&str, Value)], u: f32) -> f32 {

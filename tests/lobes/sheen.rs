@@ -1,18 +1,13 @@
 //! The sheen against its double-precision reference tables.
 
-mod common;
-
-use common::{Stack, at, lobe, table};
+use crate::common::{Stack, alone, at, lobe, table};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
 use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
 
 fn sheen(r: f64, softening: f32) -> ClosureTree {
-    let mut tree = ClosureTree::new();
-    let top = lobe(&mut tree, LobeKind::Sheen, &[("roughness", r as f32), ("softening", softening)]);
-    tree.set_root(top);
-    tree
+    alone(LobeKind::Sheen, &[("roughness", r as f32), ("softening", softening)])
 }
 
 #[test]

@@ -1,12 +1,9 @@
 //! The bounds of the lobes that follow a thread, at random directions: with all parameters known, and with tables that
 //! were baked without knowing some.
 
-mod common;
-
-use common::{Stack, block};
+use crate::common::{Stack, alone};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
-use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -34,11 +31,7 @@ fn place(k: usize, rng: &mut Pcg64Mcg) -> [f32; 3] {
 }
 
 fn stack(kind: LobeKind, set: &[(&str, f32)], unknown: &[&str]) -> Stack<f32> {
-    let mut tree = ClosureTree::new();
-    let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
-    let root = tree.lobe(kind, 0, &values);
-    tree.set_root(root);
-    Stack::varying(tree, Precision::STANDARD, unknown)
+    Stack::varying(alone(kind, set), Precision::STANDARD, unknown)
 }
 
 /// Measures the albedo from both sides and holds it against 1 and against the bound; returns the largest. These lobes

@@ -1,8 +1,6 @@
 //! Closures that a host brings along are lobes like any other.
 
-mod common;
-
-use common::at;
+use crate::common::at;
 use overcoat::audit::{Side, Tolerance, albedo, chi2, reciprocity_error};
 use overcoat::closure::LayeringRule;
 use overcoat::lobes::host::{ClosureSpec, HostLobe, RegisterError};

@@ -1,8 +1,6 @@
 //! The `balanced` rule: lossless and reciprocal where it can be, `min` where not.
 
-mod common;
-
-use common::at;
+use crate::common::at;
 use overcoat::audit::chi2::direction;
 use overcoat::audit::{Side, Tolerance, albedo, reciprocity_error};
 use overcoat::closure::balance::Balance;

@@ -1,8 +1,6 @@
-//! The layering rule: hand-made trees where other engines gain energy. Random ones are in tests/audit.rs.
+//! The layering rule: hand-made trees where other engines gain energy. Random ones are in tests/energy/audit.rs.
 
-mod common;
-
-use common::{Stack, at, lobe};
+use crate::common::{Stack, at, lobe};
 use overcoat::albedo::Precision;
 use overcoat::audit::campaign::{LIMIT, promises};
 use overcoat::audit::{Side, Tolerance, albedo, albedo_until, reciprocity_error};

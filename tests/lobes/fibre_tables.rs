@@ -1,20 +1,13 @@
 //! The tables of the lobes that follow a thread: the standard tier's against the reference tier's, and both against the
 //! albedo as the audit measures it.
 
-mod common;
-
-use common::{Stack, block};
+use crate::common::{Stack, alone};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo};
-use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
 
 fn stack(kind: LobeKind, set: &[(&str, f32)], precision: Precision) -> Stack<f64> {
-    let mut tree = ClosureTree::new();
-    let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
-    let root = tree.lobe(kind, 0, &values);
-    tree.set_root(root);
-    Stack::new(tree, precision)
+    Stack::new(alone(kind, set), precision)
 }
 
 /// The largest difference of the standard tables from the reference tables, and of each from the measured albedo; away

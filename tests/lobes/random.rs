@@ -1,9 +1,7 @@
 //! A million random parameters and directions per lobe: finite, not negative, and single precision follows double.
 //! The tables are those for parameters that are not known before shading, the hardest case.
 
-mod common;
-
-use common::rounding;
+use crate::common::rounding;
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::chi2::direction;
 use overcoat::lobes::registry::{LobeClass, ParamSpec, ParamTy};

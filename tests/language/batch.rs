@@ -1,13 +1,10 @@
 //! Many points shaded with one call get, bit for bit, the trees they get one by one.
 
-#[path = "common/programs.rs"]
-mod programs;
-
+use crate::programs::{LIBRARY, statement};
 use overcoat::Globals;
 use overcoat::closure::ClosureTree;
 use overcoat::ir::{self, Batch, Host, Lookup, Program};
 use overcoat::syntax::{Limits, Options};
-use programs::{LIBRARY, statement};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::Arc;

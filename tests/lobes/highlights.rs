@@ -1,21 +1,15 @@
 //! Phong's and Ward's highlights: bounded at every width, tables true, samples as they say.
 
-mod common;
-
-use common::{Stack, lobe, turned};
+use crate::common::{Stack, alone, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
-use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
 use overcoat::optics::Scalar;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 fn single<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Stack<S> {
-    let mut tree = ClosureTree::new();
-    let root = lobe(&mut tree, kind, set);
-    tree.set_root(root);
-    Stack::new(tree, Precision::STANDARD)
+    Stack::new(alone(kind, set), Precision::STANDARD)
 }
 
 type Subject = (LobeKind, &'static [(&'static str, f32)]);

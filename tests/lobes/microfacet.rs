@@ -1,8 +1,6 @@
 //! Rough surfaces: nothing is lost at any roughness, from either medium, and smooth ones are the limit.
 
-mod common;
-
-use common::{Stack, lobe, turned};
+use crate::common::{Stack, alone, block, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;
@@ -12,10 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 fn single<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Stack<S> {
-    let mut tree = ClosureTree::new();
-    let root = lobe(&mut tree, kind, set);
-    tree.set_root(root);
-    Stack::new(tree, Precision::STANDARD)
+    Stack::new(alone(kind, set), Precision::STANDARD)
 }
 
 /// What 40 000 samples carry on average: an estimate of the albedo that needs no grid, to about 0.004.
@@ -151,7 +146,7 @@ fn a_film_on_glass_divides_nearly_all_light() {
 #[test]
 fn a_colored_boundary_reflects_one_color_and_passes_the_rest() {
     let mut tree = ClosureTree::new();
-    let mut values = common::block(LobeKind::GeneralizedSchlick, |p| p.name.starts_with("roughness").then_some(1e-4));
+    let mut values = block(LobeKind::GeneralizedSchlick, |p| p.name.starts_with("roughness").then_some(1e-4));
     let slot = |name: &str| LobeKind::GeneralizedSchlick.spec().slot_of(name).expect("there");
     values[slot("transmission_tint")..][..3].fill(1.0);
     values[slot("f0")..][..3].copy_from_slice(&[0.3, 0.1, 0.02]);

@@ -1,20 +1,14 @@
 //! The lobes that follow a thread: against reference values, at the thread's poles, and how well they are sampled.
 
-mod common;
-
-use common::{Stack, lobe, table};
+use crate::common::{Stack, alone, block, table};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
-use overcoat::closure::ClosureTree;
 use overcoat::lobes::{LobeKind, cylinder, fabric};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 fn stack(kind: LobeKind, set: &[(&str, f32)]) -> Stack<f32> {
-    let mut tree = ClosureTree::new();
-    let only = lobe(&mut tree, kind, set);
-    tree.set_root(only);
-    Stack::new(tree, Precision::STANDARD)
+    Stack::new(alone(kind, set), Precision::STANDARD)
 }
 
 /// The direction at angle `theta` along the thread and `phi` around it, in degrees.
@@ -259,7 +253,7 @@ fn cloths_are_sampled_better_than_uniformly() {
 /// Baking is part of compiling a material.
 #[test]
 fn tables_are_small_and_quick() {
-    let known = |kind: LobeKind| common::block(kind, |_| None).into_iter().map(Some).collect::<Vec<_>>();
+    let known = |kind: LobeKind| block(kind, |_| None).into_iter().map(Some).collect::<Vec<_>>();
     let mut cases = vec![
         ("fabric", LobeKind::Fabric, known(LobeKind::Fabric)),
         ("thread", LobeKind::Thread, known(LobeKind::Thread)),

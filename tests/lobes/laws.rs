@@ -1,8 +1,6 @@
 //! What must hold for every registered lobe. Driven by the registry: a new lobe is covered by being listed.
 
-mod common;
-
-use common::{Stack, at, block, blocks, rounding, turned};
+use crate::common::{Stack, at, block, blocks, rounding, turned};
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::{Side, Tolerance, albedo, chi2, reciprocity_error};
 use overcoat::closure::ClosureTree;

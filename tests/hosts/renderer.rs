@@ -1,8 +1,6 @@
 //! What a host renderer asks of a BSDF: flags, transparency, transport, memory that is used again, trees built in code.
 
-mod common;
-
-use common::at;
+use crate::common::at;
 use overcoat::albedo::Precision;
 use overcoat::audit::{self, Side, Tolerance};
 use overcoat::closure::builder::{Arg, BuildError};

@@ -1,9 +1,7 @@
 //! How well lobes are sampled: chi-square over roughness and angle, and the variance of f·cos/pdf beside that of
 //! uniform directions. Run with `--nocapture` for the tables.
 
-mod common;
-
-use common::{Stack, at, block, lobe};
+use crate::common::{Stack, alone, at, block, lobe};
 use overcoat::albedo::Precision;
 use overcoat::albedo::quadrature::Rule;
 use overcoat::audit::chi2;
@@ -33,10 +31,7 @@ const SUBJECTS: [Subject; 8] = [
 ];
 
 fn stack(kind: LobeKind, set: &[(&str, f32)], r: f64) -> Stack<f32> {
-    let mut tree = ClosureTree::new();
-    let root = lobe(&mut tree, kind, &[set, &[("roughness", r as f32)]].concat());
-    tree.set_root(root);
-    Stack::new(tree, Precision::STANDARD)
+    Stack::new(alone(kind, &[set, &[("roughness", r as f32)]].concat()), Precision::STANDARD)
 }
 
 /// Relative variances of f·cos/pdf for ωo at `cos`: with the lobe's own samples, and with uniform ones.

@@ -1,8 +1,6 @@
 //! The audit's own tests: are its random trees what it says, does it measure right, does it find what gains?
 
-mod common;
-
-use common::{Stack, at, lobe};
+use crate::common::{Stack, at, lobe};
 use overcoat::albedo::Precision;
 use overcoat::audit::campaign::{BLOCK, Campaign, Tally};
 use overcoat::audit::trees::{MAX_DEPTH, Pool, Recipe};

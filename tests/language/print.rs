@@ -1,12 +1,8 @@
 //! Printed and parsed again, a script is the same script: operators climb as they should, and nothing written is lost.
 
-#[path = "common/print.rs"]
-mod print;
-#[path = "common/programs.rs"]
-mod programs;
-
+use crate::printer::print;
+use crate::programs::{LIBRARY, statement};
 use overcoat::syntax::{self, ast::Ast};
-use programs::{LIBRARY, statement};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -16,14 +12,14 @@ fn parse(text: &str) -> Ast {
 
 /// Every operation in parentheses: if they say what the parser understood, they change nothing.
 fn same_again(text: &str) {
-    let once = print::print(&parse(text));
-    let twice = print::print(&parse(&once));
+    let once = print(&parse(text));
+    let twice = print(&parse(&once));
     assert!(once == twice, "{text}\n{once}\n{twice}");
 }
 
 #[test]
 fn printing_shows_how_operators_climb() {
-    let printed = |text: &str| print::print(&parse(text));
+    let printed = |text: &str| print(&parse(text));
     let expected = "float a=((1+(2*3))-(-4));(a=(a+=(b?c:(d?e:f))));(x=((a<<1)<(b&(c==d))));\n";
     assert_eq!(printed("float a = 1 + 2*3 - - 4; a = a += b ? c : d ? e : f; x = a<<1 < (b & c==d);"), expected);
     assert_eq!(printed("if (!a.b[1]) { x++; } else --x;"), "if((!a.b[1])){(x++);}else {(--x);}\n");

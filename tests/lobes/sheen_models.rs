@@ -1,8 +1,6 @@
 //! The sheen models and the velvet against double-precision reference tables.
 
-mod common;
-
-use common::{Stack, at, lobe, table};
+use crate::common::{Stack, alone, at, table};
 use overcoat::albedo::quadrature::Rule;
 use overcoat::albedo::{AlbedoCurve, Precision};
 use overcoat::audit::{Side, Tolerance, albedo};
@@ -18,18 +16,11 @@ const CHARLIE_V: f32 = 4.0;
 const ZELTNER: f32 = 5.0;
 
 fn sheen(r: f64, model: f32, softening: f32) -> ClosureTree {
-    let mut tree = ClosureTree::new();
-    let set = [("roughness", r as f32), ("model", model), ("softening", softening)];
-    let top = lobe(&mut tree, LobeKind::Sheen, &set);
-    tree.set_root(top);
-    tree
+    alone(LobeKind::Sheen, &[("roughness", r as f32), ("model", model), ("softening", softening)])
 }
 
 fn velvet(r: f64) -> ClosureTree {
-    let mut tree = ClosureTree::new();
-    let top = lobe(&mut tree, LobeKind::Velvet, &[("roughness", r as f32)]);
-    tree.set_root(top);
-    tree
+    alone(LobeKind::Velvet, &[("roughness", r as f32)])
 }
 
 /// The largest relative error of Λ over the whole table.
