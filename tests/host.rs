@@ -1,4 +1,5 @@
 //! Closures that a host brings along are lobes like any other.
+#![cfg(feature = "cloth")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The layering rule: hand-made trees where other engines gain energy. Random ones are in tests/audit.rs.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The sheen against its double-precision reference tables.
+#![cfg(feature = "cloth")]
 
 mod common;
 

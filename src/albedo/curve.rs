@@ -466,6 +466,7 @@ pub(crate) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync
     })
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

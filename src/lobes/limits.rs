@@ -153,6 +153,7 @@ fn at_the_nodes(
 }
 
 /// The largest albedo of each component over all directions.
+#[cfg(feature = "cloth")]
 pub(super) fn components(spec: TableSpec) -> [f64; crate::albedo::COMPONENTS] {
     baked(spec, Precision::FAST).fibre().highest()
 }
@@ -248,6 +249,7 @@ fn baked(spec: TableSpec, precision: Precision) -> Arc<AlbedoCurve<f64>> {
     table
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -45,6 +45,7 @@ impl<S: Real> Facets<S> {
     }
 
     /// Whether the slopes are GGX's.
+    #[cfg(feature = "microfacet")]
     #[inline(always)]
     pub(crate) fn is_ggx(&self) -> bool {
         matches!(self.shape, Shape::Ggx)

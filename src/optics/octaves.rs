@@ -42,6 +42,7 @@ pub fn cubic([a, b, c, d]: [f32; 4], t: f32) -> f32 {
 }
 
 /// The cubics of `f` over (0, 1), four coefficients per cell, through its values at Chebyshev's nodes.
+#[cfg(feature = "cloth")]
 pub fn fit<const OCTAVES: u32, const DIGITS: u32>(f: impl Fn(f64) -> f64) -> Vec<f64> {
     let node = |k: usize| ((2 * k + 1) as f64 * std::f64::consts::PI / 8.0).cos();
     let cells = (0..OCTAVES << DIGITS).map(|cell| {
@@ -61,6 +62,7 @@ pub fn fit<const OCTAVES: u32, const DIGITS: u32>(f: impl Fn(f64) -> f64) -> Vec
     cells.flatten().collect()
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;
