@@ -1,11 +1,9 @@
-//! What the language costs: compiling a script, and running it at a point.
+//! What the language costs at a point: running a script there.
 
 use divan::{Bencher, black_box};
 use overcoat::{Engine, Globals, Material};
 
 const VELVET: &str = include_str!("../examples/velvet.osl");
-
-const GENERATED: &str = include_str!("../tests/corpus/osl/standard_surface.osl");
 const VARYING: &str = "Ci = sheen(color(0.55, 0.02, 0.04) * diffuse(N), N, color(1), 0.07 + 0.9 * u);";
 
 /// Four octaves of Perlin noise in a loop; a branch drives color and roughness.
@@ -33,47 +31,9 @@ surface rough(color a = color(0.8, 0.2, 0.1), color b = color(0.1, 0.2, 0.8))
     Ci = c * oren_nayar(N, r);
 }";
 
-/// A material of about 500 lines: 100 functions of five lines, all of them called.
-fn long() -> String {
-    let mut text = String::new();
-    for i in 0..100 {
-        text += &format!(
-            "float part{i}(float x, float y)\n{{\n    float a = sin(x * {i}.5) + y;\n    return clamp(a, 0, 1);\n}}\n"
-        );
-    }
-    text += "surface long(float k = 0.5) {\n    float sum = 0;\n";
-    for i in 0..100 {
-        text += &format!("    sum += part{i}(u + k, v) * 0.01;\n");
-    }
-    text + "    Ci = sum * diffuse(N);\n}\n"
-}
-
 fn material(text: &str) -> Material {
     let shader = Engine::new().compile("bench", text).expect("compiles");
     shader.material(&[]).expect("specialises")
-}
-
-#[divan::bench]
-fn compile_velvet(bencher: Bencher) {
-    bencher.bench(|| Engine::new().compile("velvet", black_box(VELVET)));
-}
-
-#[divan::bench]
-fn compile_500_lines(bencher: Bencher) {
-    let text = long();
-    bencher.bench(|| Engine::new().compile("long", black_box(&text)));
-}
-
-/// A generated material: 240 lines of its own after 300 of operators.
-#[divan::bench]
-fn compile_standard_surface(bencher: Bencher) {
-    bencher.bench(|| Engine::new().compile("woven", black_box(GENERATED)));
-}
-
-#[divan::bench]
-fn specialise_500_lines(bencher: Bencher) {
-    let shader = Engine::new().compile("long", &long()).expect("compiles");
-    bencher.bench(|| shader.material(black_box(&[])));
 }
 
 fn shade(bencher: Bencher, text: &str) {

@@ -246,7 +246,9 @@ fn descend(score: &impl Fn(&[f64]) -> f64, start: &[f64]) -> (f64, Vec<f64>) {
 }
 
 fn write_table(text: &mut String, name: &str, doc: &str, table: &[[f64; PARAMS]]) {
-    let _ = writeln!(text, "\n/// {doc}\n#[rustfmt::skip]\npub const {name}: Table = [");
+    // Eon's is there in every build.
+    let only = if name == "EON" { "" } else { "#[cfg(feature = \"cloth\")]\n" };
+    let _ = writeln!(text, "\n/// {doc}\n{only}#[rustfmt::skip]\npub const {name}: Table = [");
     for nodes in table.chunks(4) {
         let row: Vec<String> = nodes.iter().flatten().map(|x| format!("{x:.5}")).collect();
         let _ = writeln!(text, "    {},", row.join(", "));

@@ -11,7 +11,7 @@ prefix=$(cd "$1" && pwd)
 profile=${2:-release}
 cd "$(dirname "$0")/.."
 
-cargo rustc --quiet --lib --no-default-features --features capi --profile "$profile" --crate-type cdylib,staticlib
+cargo rustc --quiet --lib --no-default-features --features capi,cloth,microfacet,legacy --profile "$profile" --crate-type cdylib,staticlib
 
 [ "$profile" = dev ] && profile=debug
 built=${CARGO_TARGET_DIR:-target}/$profile

@@ -61,11 +61,13 @@ impl Tier {
 /// as long as a material uses them. Any thread may use it.
 ///
 /// ```
+/// # #[cfg(feature = "cloth")] {
 /// use overcoat::{Engine, Globals};
 /// let shader = Engine::new().compile("velvet", "Ci = sheen(color(0.6, 0, 0.05) * diffuse(N), N, 1, 0.3);")?;
 /// let material = shader.material(&[])?;
 /// let bsdf = material.shade(&Globals::default(), glam::Vec3::Z)?;
 /// assert!(bsdf.eval([0.0, 0.6, 0.8]).f_cos[0] > 0.1);
+/// # }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default)]

@@ -7,6 +7,7 @@
 //! Compile once, shade per point:
 //!
 //! ```
+//! # #[cfg(feature = "cloth")] {
 //! use overcoat::{Engine, Globals, ir::Value};
 //!
 //! let script = "
@@ -23,12 +24,14 @@
 //! let eval = bsdf.eval([0.0, 0.6, 0.8]);
 //! let sample = bsdf.sample([0.3, 0.6, 0.9]).expect("this lobe loses no samples");
 //! assert!(eval.f_cos[0] > eval.f_cos[1] && sample.pdf > 0.0);
+//! # }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Does the material keep energy? Put it in a white furnace, from both sides:
 //!
 //! ```
+//! # #[cfg(feature = "cloth")] {
 //! # use overcoat::{Engine, Globals};
 //! use overcoat::audit::{self, Side};
 //! # let shader = Engine::new().compile("white", "Ci = sheen(diffuse(N), N, 1, 0.5);")?;
@@ -39,6 +42,7 @@
 //!     let albedo = audit::albedo(&subject, side, [0.6, 0.0, 0.8], Default::default());
 //!     assert!(albedo.max() <= 1.0001);
 //! }
+//! # }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

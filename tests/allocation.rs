@@ -1,4 +1,5 @@
 //! Shading up to eight lobes, and evaluating and sampling any number, leave the heap alone.
+#![cfg(feature = "cloth")]
 #![allow(unsafe_code)]
 
 use overcoat::{Engine, Globals};

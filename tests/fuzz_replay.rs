@@ -1,5 +1,6 @@
 //! The fuzzers' targets on the inputs that fuzzing kept, on the scripts of the corpus, and on inputs that a seed draws:
 //! what fuzzing does, in small. `fuzz/run.sh` looks further, `fuzz/keep.py` keeps what it finds.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 #[path = "../fuzz/src/lib.rs"]
 mod targets;

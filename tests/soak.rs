@@ -2,6 +2,7 @@
 //! an engine and a material get what one gets.
 //!
 //! `OVERCOAT_SOAK=100000000 cargo test --release --test soak` evaluates that many directions.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::albedo::Precision;
 use overcoat::audit::chi2::direction;

@@ -42,11 +42,14 @@ pub struct CurveSpec {
     /// Numbers the lobe wants beside its albedos, from the key and the axis; see [`AlbedoCurve::extra`].
     pub extra: fn(&[f64; 4], Option<Axis>) -> Extra<f64>,
     /// From the key, E_view and the bound over the cosine: what it reads in one place, where nothing varies.
-    pub cells: fn(&[f64; 4], &dyn Fn(f64) -> f64, &dyn Fn(f64) -> f64) -> Option<Cells>,
+    pub cells: CellsOf,
 }
 
 /// Tables of a lobe's own, beside its albedos; which is for what, the lobe knows.
 pub type Extra<S> = [Vec<S>; 2];
+
+/// See [`CurveSpec::cells`].
+pub type CellsOf = fn(&[f64; 4], &dyn Fn(f64) -> f64, &dyn Fn(f64) -> f64) -> Option<Cells>;
 
 /// For [`CurveSpec::cells`]: nothing.
 pub fn no_cells(_: &[f64; 4], _: &dyn Fn(f64) -> f64, _: &dyn Fn(f64) -> f64) -> Option<Cells> {
@@ -487,6 +490,7 @@ pub(crate) fn parallel<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync
     })
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,6 +11,7 @@
 
 use super::bends::bends;
 use super::curve::{AlbedoCurve, CurveSpec, Precision, parallel};
+#[cfg(feature = "microfacet")]
 use super::facets::FacetSpec;
 use super::grid::{Grid, direction, first_place};
 use super::panels::Panels;
@@ -82,8 +83,10 @@ pub enum TableSpec {
     /// Over the cosine: isotropic lobes.
     Cosine(CurveSpec),
     /// Around a thread.
+    #[cfg(feature = "cloth")]
     Fibre(FibreSpec),
     /// Of rough surfaces.
+    #[cfg(feature = "microfacet")]
     Facets(FacetSpec),
 }
 
@@ -92,11 +95,13 @@ impl TableSpec {
     pub fn bake<S: Scalar>(&self, precision: Precision) -> AlbedoCurve<S> {
         match self {
             TableSpec::Cosine(spec) => spec.bake(precision),
+            #[cfg(feature = "cloth")]
             TableSpec::Fibre(spec) => {
                 let mut curve = AlbedoCurve::default();
                 curve.fibre = spec.bake(precision);
                 curve
             }
+            #[cfg(feature = "microfacet")]
             TableSpec::Facets(spec) => {
                 let mut curve = AlbedoCurve::default();
                 curve.facets = spec.bake(precision);

@@ -69,12 +69,14 @@ impl std::error::Error for Gain {}
 /// budget gives nothing back.
 ///
 /// ```
+/// # #[cfg(feature = "cloth")] {
 /// use overcoat::{Engine, audit};
 /// let compile = |script| Engine::new().compile("cloth", script).unwrap().material(&[]).unwrap();
 /// audit::assert_no_gain(&compile("Ci = sheen(diffuse(N), N, 1, 0.5);"))?;
 /// let gain = audit::assert_no_gain(&compile("Ci = diffuse(N) + sheen(N, 0.5);")).unwrap_err();
 /// assert!(gain.to_string().contains("`cloth` gains energy on the view side"));
-/// # Ok::<(), audit::Gain>(())
+/// # }
+/// # Ok::<(), overcoat::audit::Gain>(())
 /// ```
 ///
 /// # Errors

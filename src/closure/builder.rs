@@ -11,8 +11,8 @@ use super::scratch::Scratch;
 use super::tree::{ClosureTree, NodeId, TreeError};
 use crate::albedo::Precision;
 use crate::globals::Globals;
-use crate::lobes::LobeKind;
 use crate::lobes::registry::{ParamSpec, ParamTy, option_index};
+use crate::lobes::{LobeKind, families};
 use crate::optics::V3;
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -85,6 +85,13 @@ impl From<Input> for Arg {
 pub enum BuildError {
     /// No closure of this name is built in or registered.
     UnknownClosure(String),
+    /// The closure belongs to a family of lobes that this build was made without.
+    LeftOut {
+        /// The closure.
+        closure: String,
+        /// The cargo feature that brings it.
+        feature: &'static str,
+    },
     /// The closure has no such parameter.
     UnknownParameter {
         /// The closure.
@@ -111,6 +118,9 @@ impl fmt::Display for BuildError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             BuildError::UnknownClosure(name) => write!(f, "there is no closure `{name}`"),
+            BuildError::LeftOut { closure, feature } => {
+                write!(f, "the closure `{closure}` was left out of this build; the cargo feature `{feature}` brings it")
+            }
             BuildError::UnknownParameter { closure, name } => write!(f, "`{closure}` has no parameter `{name}`"),
             BuildError::WrongValue { closure, name, expected } => {
                 write!(f, "`{name}` of `{closure}` is not {expected}")
@@ -165,6 +175,7 @@ enum Step {
 /// Composes closures in code. Mistakes are kept and reported by [`finish`](Self::finish).
 ///
 /// ```
+/// # #[cfg(feature = "cloth")] {
 /// use overcoat::closure::Builder;
 /// use overcoat::Globals;
 ///
@@ -182,6 +193,7 @@ enum Step {
 /// inputs.set(roughness, 0.5)?;
 /// let bsdf = cloth.shade(&Globals::default(), glam::Vec3::new(0.6, 0.0, 0.8), &inputs)?;
 /// assert!(bsdf.eval([0.0, 0.6, 0.8]).f_cos[0] > 0.1);
+/// # }
 /// # Ok::<(), overcoat::Error>(())
 /// ```
 #[derive(Debug)]
@@ -261,7 +273,11 @@ impl Builder {
     pub fn lobe<'a>(&mut self, name: &str, args: impl IntoIterator<Item = (&'a str, Arg)>) -> Part {
         let host = self.hosts.iter().copied().find(|k| k.spec().name == name);
         let Some(kind) = host.or_else(|| LobeKind::by_name(name)) else {
-            return self.refuse(BuildError::UnknownClosure(name.to_owned()));
+            let closure = name.to_owned();
+            return self.refuse(match families::left_out(name) {
+                Some(feature) => BuildError::LeftOut { closure, feature },
+                None => BuildError::UnknownClosure(closure),
+            });
         };
         let mut site = Site { kind, block: SmallVec::new(), open: SmallVec::new() };
         for p in kind.spec().params {

@@ -438,6 +438,7 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     }
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

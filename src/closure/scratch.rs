@@ -7,6 +7,7 @@ use crate::optics::Scalar;
 /// allocates only where a tree is larger than all before. One per thread.
 ///
 /// ```
+/// # #[cfg(feature = "cloth")] {
 /// use overcoat::{Engine, Globals, Scratch};
 /// let material = Engine::new().material("cloth", "Ci = sheen(diffuse(N), N, 1, 0.3);")?;
 /// let mut scratch = Scratch::new();
@@ -15,6 +16,7 @@ use crate::optics::Scalar;
 ///     let bsdf = material.shade_in(&Globals::default(), wo, &mut scratch)?;
 ///     assert!(bsdf.albedo()[0] <= 1.0);
 /// }
+/// # }
 /// # Ok::<(), overcoat::Error>(())
 /// ```
 #[derive(Clone, Debug)]

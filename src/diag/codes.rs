@@ -164,6 +164,13 @@ pub const CODES: &[Code] = &[
         "Keyword arguments come in pairs, `\"name\", value`, each name once.",
     ),
     code(
+        "E0305",
+        "a closure that was left out of this build",
+        "Closures come in families, and whoever builds overcoat into a program may leave some out. The message names the cargo\n\
+         feature that brings this one: `cloth` sheens and threads, `microfacet` rough and smooth surfaces, `legacy` the\n\
+         highlights of old, phong and ward.",
+    ),
+    code(
         "E0401",
         "an unknown parameter",
         "The shader has no parameter of that name. Parts of a struct are set as `s.x`, elements of an array as `a[0]`.",

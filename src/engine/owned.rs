@@ -20,12 +20,14 @@ self_cell!(
 /// Shading the same material again uses the same memory.
 ///
 /// ```
+/// # #[cfg(feature = "cloth")] {
 /// use overcoat::{Engine, Globals, OwnedBsdf};
 /// let material = Engine::new().material("cloth", "Ci = sheen(diffuse(N), N, 1, 0.3);")?;
 /// let mut bsdf = OwnedBsdf::new(material.clone());
 /// bsdf.shade(&material, &Globals::default(), glam::Vec3::Z)?;
 /// drop(material);
 /// assert!(bsdf.with(|bsdf| bsdf.eval([0.0, 0.6, 0.8])).pdf > 0.0);
+/// # }
 /// # Ok::<(), overcoat::Error>(())
 /// ```
 pub struct OwnedBsdf(Cell);

@@ -10,7 +10,7 @@ use super::ops::divide;
 use super::shader::Value;
 use super::types::Ty;
 use crate::globals::Globals;
-use crate::lobes::conductor;
+use crate::optics::fresnel;
 
 /// One of them. The arguments and results stand in the order of the comment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,7 +172,7 @@ impl Task {
             Task::SplineInverse => spline_inverse(args, around, out),
             Task::Fresnel => fresnel(triple(0), triple(1), float(2, 0), out),
             Task::ArtisticIor => {
-                let (n, k) = conductor::artistic_ior(triple(0), triple(1));
+                let (n, k) = fresnel::artistic_ior(triple(0), triple(1));
                 put_triple(out, n);
                 put_triple(&mut out[1..], k);
             }

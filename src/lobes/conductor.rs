@@ -14,7 +14,7 @@ use super::{Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::film::Film;
-use crate::optics::{Over, Real, V3, fresnel};
+use crate::optics::{Over, Real, V3};
 
 closure! {
     /// Reflection by a metal's facets, what bounces between them included. One-sided.
@@ -44,14 +44,6 @@ closure! {
 }
 
 const SPEC: &LobeSpec = ConductorParams::SPEC;
-
-/// n and k of a metal that reflects `reflectivity` (at most 0.99) at normal incidence; `edge_tint` in [0, 1] tints its
-/// edge: 1 keeps the color, 0 lets it whiten late (Gulbrandsen 2014, eq. 7-9).
-pub fn artistic_ior(reflectivity: [f32; 3], edge_tint: [f32; 3]) -> ([f32; 3], [f32; 3]) {
-    let pairs: [(f64, f64); 3] =
-        std::array::from_fn(|c| fresnel::artistic(f64::from(reflectivity[c]), f64::from(edge_tint[c])));
-    (pairs.map(|p| p.0 as f32), pairs.map(|p| p.1 as f32))
-}
 
 /// See [`ConductorParams`].
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,9 @@
 //! never exceeded between them. Tables are kept for the life of the process: checking a folder of scripts asks for the
 //! same few over and over.
 
-use super::registry::{LobeSpec, ParamTy};
+use super::registry::LobeSpec;
+#[cfg(any(feature = "cloth", feature = "microfacet"))]
+use super::registry::ParamTy;
 use super::{AnyLobe, LobeKind};
 use crate::albedo::quadrature::Rule;
 use crate::albedo::{AlbedoCurve, CurveSpec, Precision, TableSpec};
@@ -48,10 +50,12 @@ pub(super) fn of_table(kind: LobeKind, ranges: &[SlotRange], cos: (f64, f64)) ->
     let Some(spec) = kind.table(&values) else { return Limits { lowest: 0.0, highest: 1.0 } };
     match spec {
         TableSpec::Cosine(curve) => of_curve(kind.spec(), &curve, ranges, cos),
+        #[cfg(feature = "cloth")]
         TableSpec::Fibre(_) => {
             let highest = around_the_thread(kind, spec, &values).unwrap_or(1.0);
             Limits::above(cos, 0.0, highest.min(1.0))
         }
+        #[cfg(feature = "microfacet")]
         TableSpec::Facets(_) => {
             let rough = at_the_nodes(kind, spec, ranges, &values, cos);
             rough.unwrap_or(Limits { lowest: 0.0, highest: 1.0 })
@@ -72,6 +76,7 @@ fn of_curve(lobe: &LobeSpec, spec: &CurveSpec, ranges: &[SlotRange], cos: (f64, 
 }
 
 /// The largest albedo of a lobe whose parameters are all known: its bound is linear between the nodes of its table.
+#[cfg(feature = "cloth")]
 fn around_the_thread(kind: LobeKind, spec: TableSpec, values: &[Option<f32>]) -> Option<f64> {
     let mut block = Vec::new();
     for p in kind.spec().params {
@@ -106,6 +111,7 @@ fn around_the_thread(kind: LobeKind, spec: TableSpec, values: &[Option<f32>]) ->
 
 /// Of a rough surface whose parameters are all known, or but for its tints: its bound is linear between the nodes of its
 /// table. One between two media may be met from either.
+#[cfg(feature = "microfacet")]
 fn at_the_nodes(
     kind: LobeKind,
     spec: TableSpec,
@@ -153,6 +159,7 @@ fn at_the_nodes(
 }
 
 /// The largest albedo of each component over all directions.
+#[cfg(feature = "cloth")]
 pub(super) fn components(spec: TableSpec) -> [f64; crate::albedo::COMPONENTS] {
     baked(spec, Precision::FAST).fibre().highest()
 }
@@ -248,6 +255,7 @@ fn baked(spec: TableSpec, precision: Precision) -> Arc<AlbedoCurve<f64>> {
     table
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

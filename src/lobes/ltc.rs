@@ -44,6 +44,7 @@ pub fn read<S: Real>(table: &Table, cos: S, roughness: S) -> [S; PARAMS] {
 }
 
 /// The numbers of `table` at a roughness, for all nodes over the cosine.
+#[cfg(feature = "cloth")]
 pub(super) fn row(table: &Table, roughness: f64) -> Vec<f64> {
     let y = (1.0 - roughness.ln() / MIN_ROUGHNESS.ln()).clamp(0.0, 1.0) * (ROUGHNESS_NODES - 1) as f64;
     let j = y.floor().min((ROUGHNESS_NODES - 2) as f64);
@@ -53,6 +54,7 @@ pub(super) fn row(table: &Table, roughness: f64) -> Vec<f64> {
 }
 
 /// The four numbers of a [`row`] at a cosine, linearly.
+#[cfg(feature = "cloth")]
 #[inline(always)]
 pub(super) fn read_row<S: Real>(row: &[S::Entry], cos: S) -> [S; PARAMS] {
     let x = cos.clamp(S::zero(), S::one()).sqrt() * S::c((COS_NODES - 1) as f64);

@@ -3,6 +3,7 @@
 use super::ltc::Table;
 
 /// Proposals for the sheens without a softened terminator: a, b, c, uniform share.
+#[cfg(feature = "cloth")]
 #[rustfmt::skip]
 pub const SHEEN: Table = [
     0.12998, 0.11153, -0.29265, 0.24186, 0.15884, 0.13607, -0.32511, 0.02000, 0.18913, 0.15254, -0.40405, 0.02000, 0.21442, 0.16454, -0.48931, 0.02000,
@@ -72,6 +73,7 @@ pub const SHEEN: Table = [
 ];
 
 /// Proposals for the softened sheens: a, b, c, uniform share.
+#[cfg(feature = "cloth")]
 #[rustfmt::skip]
 pub const SOFTENED: Table = [
     0.35093, 0.28416, -0.35742, 0.02000, 0.39211, 0.30738, -0.40039, 0.02000, 0.44745, 0.33707, -0.46358, 0.02000, 0.49161, 0.35884, -0.52454, 0.02000,
@@ -141,6 +143,7 @@ pub const SOFTENED: Table = [
 ];
 
 /// Proposals for the velvet: a, b, c, uniform share.
+#[cfg(feature = "cloth")]
 #[rustfmt::skip]
 pub const VELVET: Table = [
     0.05000, 0.05000, -0.52397, 0.89543, 0.05000, 0.05000, -0.92721, 0.95615, 0.76183, 0.76615, -0.00060, 0.86721, 0.72149, 0.72179, -0.00003, 0.57481,
@@ -279,6 +282,7 @@ pub const EON: Table = [
 ];
 
 /// The sheen of transformed cosines itself: a, b, c, albedo.
+#[cfg(feature = "cloth")]
 #[rustfmt::skip]
 pub const ZELTNER: Table = [
     0.17443, 0.14528, -0.26174, 0.99952, 0.18351, 0.15042, -0.29429, 0.91001, 0.20355, 0.16206, -0.36150, 0.75003, 0.22363, 0.17301, -0.44030, 0.57786,

@@ -5,12 +5,12 @@
 //!
 //! Where this departs from the source: reflectivity counts as at most 0.99; roughness is used as the width α of the slopes.
 
-use super::conductor::{Conductor, ConductorParams, artistic_ior};
+use super::conductor::{Conductor, ConductorParams};
 use super::registry::{ClosureParams, closure};
 use super::rough::widths;
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, TableSpec};
-use crate::optics::{Over, Real, V3};
+use crate::optics::{Over, Real, V3, fresnel};
 
 closure! {
     /// Reflection by a metal's facets, the metal given by its colors. One-sided.
@@ -62,7 +62,7 @@ impl<S: Real> Lobe<S> for Metal<S> {
             }
             Some(color)
         };
-        let known = color(8, 4).zip(color(11, 5)).map(|(r, g)| artistic_ior(r, g));
+        let known = color(8, 4).zip(color(11, 5)).map(|(r, g)| fresnel::artistic_ior(r, g));
         for c in 0..3 {
             block[8 + c] = known.map(|k| k.0[c]);
             block[11 + c] = known.map(|k| k.1[c]);
@@ -77,7 +77,7 @@ impl<S: Real> Lobe<S> for Metal<S> {
 
     fn new(params: &MetalParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let MetalParams { N, U, roughness_x, roughness_y, reflectivity, edge_tint, distribution, .. } = *params;
-        let (ior, extinction) = artistic_ior(reflectivity, edge_tint);
+        let (ior, extinction) = fresnel::artistic_ior(reflectivity, edge_tint);
         let MetalParams { thinfilm_thickness, thinfilm_ior, .. } = *params;
         let params = ConductorParams {
             N,

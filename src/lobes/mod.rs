@@ -4,6 +4,7 @@
 //! Out: f, pdf, samples, albedo and – required – a bound on the albedo. A lobe never sees other lobes, weights,
 //! layers or world space.
 
+#[cfg(feature = "cloth")]
 pub mod charlie;
 pub mod ltc;
 pub mod registry;
@@ -11,44 +12,70 @@ pub mod tags;
 
 mod aliases;
 pub mod burley;
+#[cfg(feature = "cloth")]
 mod charlie_terms;
+#[cfg(feature = "cloth")]
 mod cloth;
+#[cfg(feature = "cloth")]
 mod cloth_range;
+#[cfg(feature = "microfacet")]
 pub mod conductor;
+#[cfg(feature = "cloth")]
 pub mod cylinder;
+#[cfg(feature = "microfacet")]
 pub mod dielectric;
 pub mod diffuse;
 pub mod emission;
 pub mod eon;
+#[cfg(feature = "cloth")]
 pub mod fabric;
+#[cfg(feature = "microfacet")]
+mod facet_aliases;
+pub mod families;
 pub mod host;
+#[cfg(feature = "microfacet")]
 mod interface;
 pub mod limits;
 mod ltc_tables;
+#[cfg(feature = "microfacet")]
 pub mod metal;
+#[cfg(feature = "cloth")]
 pub mod microcylinder;
+#[cfg(feature = "cloth")]
 pub mod microcylinder_threads;
+#[cfg(feature = "microfacet")]
 pub mod microfacet;
 pub mod oren_nayar;
 pub mod oren_nayar_diffuse;
+#[cfg(feature = "microfacet")]
 mod pane;
+#[cfg(feature = "legacy")]
 pub mod phong;
+#[cfg(feature = "microfacet")]
 mod rough;
+#[cfg(feature = "microfacet")]
 pub mod schlick;
+#[cfg(feature = "cloth")]
 pub mod sheen;
 pub mod signals;
+mod signatures;
+#[cfg(feature = "microfacet")]
 pub mod specular;
 pub mod subsurface;
+#[cfg(feature = "cloth")]
 pub mod thread;
 pub mod translucent;
 pub mod transparent;
+#[cfg(feature = "cloth")]
 pub mod velvet;
+#[cfg(feature = "legacy")]
 pub mod ward;
 
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Over, Real, V3};
 use limits::{Limits, SlotRange};
-use registry::{Build, ClosureParams, Form, LobeClass, LobeSpec, ParamSpec};
+use registry::{ClosureParams, LobeClass, LobeSpec};
+pub use signatures::forms;
 
 /// A value per colour channel.
 pub type Rgb<R> = [R; 3];
@@ -73,6 +100,7 @@ impl Sides {
     pub const BOTH: Sides = Sides { reflect: true, transmit: true };
 
     /// Those of what is reflected and of what is transmitted that has a tint.
+    #[cfg(feature = "microfacet")]
     fn tinted(tints: [Rgb32; 2]) -> Sides {
         let [reflect, transmit] = tints.map(|t| t.iter().any(|x| *x > 0.0));
         Sides { reflect, transmit }
@@ -242,40 +270,48 @@ pub(crate) trait LobeVisitor<S: Real> {
 }
 
 macro_rules! lobes {
-    ($( $module:ident :: $Lobe:ident ),* $(,)?) => {
+    ($( $( #[cfg(feature = $family:literal)] )? $module:ident :: $Lobe:ident ),* $(,)?) => {
         /// Names one of the registered lobes.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum LobeKind {
-            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe, )*
+            $( $( #[cfg(feature = $family)] )? #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe, )*
             /// A closure that a host brought along.
             Host(host::HostKind),
         }
 
         impl LobeKind {
             /// Every built-in lobe.
-            pub const ALL: &[LobeKind] = &[ $( LobeKind::$Lobe ),* ];
+            pub const ALL: &[LobeKind] = &[ $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe ),* ];
+
+            /// The cargo feature that brings the lobe along; `None` for those that are always there.
+            pub fn family(self) -> Option<&'static str> {
+                match self {
+                    $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => None$( .or(Some($family)) )?, )*
+                    LobeKind::Host(_) => None,
+                }
+            }
 
             /// The lobe's declaration.
             pub fn spec(self) -> &'static LobeSpec {
                 match self {
-                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC, )*
+                    $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::Params::SPEC, )*
                     LobeKind::Host(host) => host.spec(),
                 }
             }
 
             /// The albedo table a parameter block needs (`None` entries: known only when shading).
             pub fn table(self, values: &[Option<f32>]) -> Option<TableSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values), )* LobeKind::Host(_) => None }
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::table(values), )* LobeKind::Host(_) => None }
             }
 
             /// The table of a lobe whose albedo depends on the cosine alone; `None` for all others.
             pub fn curve(self, values: &[Option<f32>]) -> Option<CurveSpec> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values), )* LobeKind::Host(_) => None }
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::curve(values), )* LobeKind::Host(_) => None }
             }
 
             /// Whether a lobe with these parameter values is reciprocal.
             pub fn reciprocal(self, values: &[f32]) -> bool {
-                match self { $( LobeKind::$Lobe => {
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::reciprocal(&params)
                 }, )* LobeKind::Host(host) => host.spec().reciprocal }
@@ -283,20 +319,20 @@ macro_rules! lobes {
 
             fn closed_limits(self, ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
                 match self {
-                    $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::limits(ranges, cos), )*
+                    $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::limits(ranges, cos), )*
                     LobeKind::Host(host) => Some(Limits { lowest: 0.0, highest: host.albedo_at_most().into() }),
                 }
             }
 
             /// See [`Lobe::tint_slot`].
             pub fn tint_slot(self) -> Option<usize> {
-                match self { $( LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => <$module::$Lobe<f32> as Lobe<f32>>::tint_slot(), )* LobeKind::Host(_) => None }
             }
 
             /// Whether f of a lobe with these parameter values depends on where its tangent points; of a host's lobe that
             /// is not known.
             pub fn follows_tangent(self, values: &[f32]) -> bool {
-                match self { $( LobeKind::$Lobe => {
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::follows_tangent(&params)
                 }, )* LobeKind::Host(_) => true }
@@ -304,7 +340,7 @@ macro_rules! lobes {
 
             /// See [`Lobe::between_media`].
             pub fn between_media(self, values: &[f32]) -> bool {
-                match self { $( LobeKind::$Lobe => {
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::between_media(&params)
                 }, )* LobeKind::Host(_) => false }
@@ -312,7 +348,7 @@ macro_rules! lobes {
 
             /// The color that multiplies a lobe with these parameter values.
             pub fn weight(self, values: &[f32]) -> Rgb32 {
-                match self { $( LobeKind::$Lobe => {
+                match self { $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => {
                     let params = <<$module::$Lobe<f32> as Lobe<f32>>::Params as ClosureParams>::from_slots(values);
                     <$module::$Lobe<f32> as Lobe<f32>>::weight(&params)
                 }, )* LobeKind::Host(_) => [1.0; 3] }
@@ -322,7 +358,7 @@ macro_rules! lobes {
         /// A prepared lobe of any kind: the one place that dispatches.
         #[derive(Clone, Copy, Debug)]
         pub enum AnyLobe<S: Real> {
-            $( #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>), )*
+            $( $( #[cfg(feature = $family)] )? #[doc = concat!("See [`", stringify!($module), "::", stringify!($Lobe), "`].")] $Lobe($module::$Lobe<S>), )*
             /// See [`host::HostLobe`].
             Host(host::Host<S>),
         }
@@ -331,7 +367,7 @@ macro_rules! lobes {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
             pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
                 match kind {
-                    $( LobeKind::$Lobe => AnyLobe::$Lobe(
+                    $( $( #[cfg(feature = $family)] )? LobeKind::$Lobe => AnyLobe::$Lobe(
                         <$module::$Lobe<S> as Lobe<S>>::new(&ClosureParams::from_slots(values), wo, curve)), )*
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
@@ -342,6 +378,7 @@ macro_rules! lobes {
             pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
                 match self {
                     AnyLobe::Diffuse(l) => turned(l, wo, curve, to, AnyLobe::Diffuse),
+                    #[cfg(feature = "cloth")]
                     AnyLobe::Sheen(l) => turned(l, wo, curve, to, AnyLobe::Sheen),
                     _ => self.turn_apart(wo, curve, to),
                 }
@@ -349,19 +386,20 @@ macro_rules! lobes {
             #[inline(never)]
             fn turn_apart(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
                 match self {
-                    $( AnyLobe::$Lobe(l) => turned(l, wo, curve, to, AnyLobe::$Lobe), )*
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => turned(l, wo, curve, to, AnyLobe::$Lobe), )*
                     AnyLobe::Host(_) => false,
                 }
             }
             /// What it is.
             pub(crate) fn kind(&self) -> LobeKind {
-                match self { $( AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
             }
             /// What evaluating a BSDF needs of a lobe, in one call.
             #[inline(always)]
             pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
                     AnyLobe::Diffuse(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
+                    #[cfg(feature = "cloth")]
                     AnyLobe::Sheen(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
                     AnyLobe::OrenNayar(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
                     _ => self.evaluate_apart(wi, curve, bound),
@@ -371,56 +409,56 @@ macro_rules! lobes {
             #[inline(never)]
             fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
                 match self {
-                    $( AnyLobe::$Lobe(l) => Lobe::<S>::evaluate(l, wi, curve, bound), )*
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => Lobe::<S>::evaluate(l, wi, curve, bound), )*
                     AnyLobe::Host(l) => l.evaluate(wi, bound),
                 }
             }
             /// See [`Lobe::f`].
             #[inline]
             pub fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.f(wi, curve), )* AnyLobe::Host(l) => l.f(wi) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.f(wi, curve), )* AnyLobe::Host(l) => l.f(wi) }
             }
             /// See [`Lobe::pdf`].
             #[inline]
             pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
-                match self { $( AnyLobe::$Lobe(l) => l.pdf(wi), )* AnyLobe::Host(l) => l.pdf(wi) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.pdf(wi), )* AnyLobe::Host(l) => l.pdf(wi) }
             }
             /// See [`Lobe::sample`].
             #[inline]
             pub fn sample(&self, u: [S; 2]) -> V3<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.sample(u), )* AnyLobe::Host(l) => l.sample(u) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.sample(u), )* AnyLobe::Host(l) => l.sample(u) }
             }
             /// See [`Lobe::albedo`].
             #[inline]
             pub fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo(w, curve), )* AnyLobe::Host(l) => l.albedo(w) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.albedo(w, curve), )* AnyLobe::Host(l) => l.albedo(w) }
             }
             /// See [`Lobe::albedo_bound`].
             #[inline]
             pub fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
-                match self { $( AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.albedo_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::view_bound`].
             pub fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
-                match self { $( AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.view_bound(w, curve), )* AnyLobe::Host(l) => l.albedo_bound(w) }
             }
             /// See [`Lobe::sides`].
             pub fn sides(&self) -> Sides {
-                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::sides(l), )* AnyLobe::Host(l) => l.sides() }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => Lobe::<S>::sides(l), )* AnyLobe::Host(l) => l.sides() }
             }
             /// See [`Lobe::roughness`].
             pub fn roughness(&self) -> S {
-                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::roughness(l), )* AnyLobe::Host(l) => l.roughness() }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => Lobe::<S>::roughness(l), )* AnyLobe::Host(l) => l.roughness() }
             }
             /// See [`Lobe::relative_eta`].
             #[inline]
             pub fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
-                match self { $( AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => l.relative_eta(wi), )* AnyLobe::Host(_) => L::one() }
             }
             /// See [`Lobe::delta`].
             #[inline]
             pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
-                match self { $( AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
+                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => Lobe::<S>::delta(l), )* AnyLobe::Host(_) => None }
             }
         }
 
@@ -431,6 +469,7 @@ macro_rules! lobes {
             pub(crate) fn albedos(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
                 match self {
                     AnyLobe::Diffuse(l) => albedos(l, w, curve, bound),
+                    #[cfg(feature = "cloth")]
                     AnyLobe::Sheen(l) => albedos(l, w, curve, bound),
                     AnyLobe::OrenNayar(l) => albedos(l, w, curve, bound),
                     _ => {
@@ -452,7 +491,7 @@ macro_rules! lobes {
             #[inline(always)]
             pub(crate) fn visit(&self, visitor: impl LobeVisitor<S>) {
                 match self {
-                    $( AnyLobe::$Lobe(l) => visitor.scattering(l), )*
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => visitor.scattering(l), )*
                     AnyLobe::Host(l) => visitor.host(l),
                 }
             }
@@ -460,29 +499,45 @@ macro_rules! lobes {
     };
 }
 
+// What a build may leave out stands behind the feature that brings it.
 lobes! {
     diffuse::Diffuse,
     translucent::Translucent,
     transparent::Transparent,
     emission::Emission,
+    #[cfg(feature = "cloth")]
     fabric::Fabric,
     oren_nayar::OrenNayar,
+    #[cfg(feature = "cloth")]
     sheen::Sheen,
+    #[cfg(feature = "cloth")]
     thread::Thread,
+    #[cfg(feature = "cloth")]
     microcylinder::Microcylinder,
+    #[cfg(feature = "cloth")]
     microcylinder_threads::MicrocylinderThreads,
+    #[cfg(feature = "cloth")]
     velvet::Velvet,
     eon::Eon,
+    #[cfg(feature = "microfacet")]
     microfacet::Microfacet,
+    #[cfg(feature = "microfacet")]
     dielectric::Dielectric,
+    #[cfg(feature = "microfacet")]
     conductor::Conductor,
+    #[cfg(feature = "microfacet")]
     schlick::GeneralizedSchlick,
+    #[cfg(feature = "microfacet")]
     specular::Reflection,
+    #[cfg(feature = "microfacet")]
     specular::Refraction,
     oren_nayar_diffuse::OrenNayarDiffuse,
     burley::Burley,
+    #[cfg(feature = "microfacet")]
     metal::Metal,
+    #[cfg(feature = "legacy")]
     phong::Phong,
+    #[cfg(feature = "legacy")]
     ward::Ward,
     subsurface::Subsurface,
     signals::Holdout,
@@ -521,26 +576,4 @@ impl LobeKind {
     pub fn by_name(name: &str) -> Option<LobeKind> {
         LobeKind::ALL.iter().copied().find(|k| k.spec().name == name)
     }
-}
-
-/// Layers one closure over another.
-const LAYER: Form = Form {
-    name: "layer",
-    params: &[
-        ParamSpec::closure("top", "What light meets first."),
-        ParamSpec::closure("base", "What lies below; scaled by what the top passes on."),
-    ],
-    doc: "`top` over `base`: the base is scaled by min(α(ωo), α(ωi)), α = 1 − the albedo bound of the top.",
-    source: "Conty & Kulla 2017, §5, after Kelemen & Szirmay-Kalos 2001",
-    reciprocal: true,
-    build: Build::Layer,
-    note: "",
-};
-
-/// Every way to call a closure: each lobe under its own name, then wrappers and aliases. Several forms may share a
-/// name; their parameter types tell them apart.
-pub fn forms() -> impl Iterator<Item = Form> {
-    let lobes = LobeKind::ALL.iter().map(|k| Form::of_lobe(*k, k.spec()));
-    let lists = [sheen::FORMS, specular::FORMS, aliases::FORMS, &subsurface::FORMS];
-    lobes.chain([LAYER, microcylinder_threads::FORM]).chain(lists.into_iter().flatten().copied())
 }

@@ -66,6 +66,12 @@ pub fn artistic<L: Real>(r: L, g: L) -> (L, L) {
     (n, k2.safe_sqrt())
 }
 
+/// [`artistic`] per channel.
+pub fn artistic_ior(reflectivity: [f32; 3], edge_tint: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+    let pairs: [(f64, f64); 3] = std::array::from_fn(|c| artistic(f64::from(reflectivity[c]), f64::from(edge_tint[c])));
+    (pairs.map(|p| p.0 as f32), pairs.map(|p| p.1 as f32))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

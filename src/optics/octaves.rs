@@ -6,6 +6,8 @@
 //! no cell can be beyond them: reading them takes no look at their length. Functions that are read at the same place share a
 //! row. Cubics are within (p/2^(`DIGITS` + 1))⁴/190 of x^p, p a few, and with the rounding of single precision within 2e-7
 //! more: as good as the function is there. For single precision alone.
+// Only cloths are read off them.
+#![cfg_attr(not(feature = "cloth"), allow(dead_code))]
 
 use super::elementary::{Bits, Single};
 use super::real::Real;
@@ -101,6 +103,7 @@ pub fn table<const WIDTH: usize, const CELLS: usize>(
     table
 }
 
+#[cfg(feature = "cloth")]
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -214,7 +214,7 @@ impl<'a> Energy<'a> {
     fn block(&self, kind: LobeKind, slots: &[Id]) -> Option<Vec<f32>> {
         let spec = kind.spec();
         // Phong's highlight is too narrow for the slices' quadrature.
-        if spec.class != LobeClass::Scatter || spec.tangent_slot().is_some() || kind == LobeKind::Phong {
+        if spec.class != LobeClass::Scatter || spec.tangent_slot().is_some() || spec.name == "phong" {
             return None;
         }
         let mut block = vec![0.0; slots.len()];

@@ -9,7 +9,6 @@ use crate::audit::Side;
 use crate::diag::Diagnostic;
 use crate::engine::Shader;
 use crate::ir::Value;
-use crate::lobes::LobeKind;
 use crate::span::Span;
 
 /// What became of a proof.
@@ -362,7 +361,7 @@ fn repairs(
             ));
         }
     }
-    let is_sheen = |t: &Term| matches!(problem.graph.closure_at(t.closure), Closure::Lobe(kind, ..) if matches!(kind, LobeKind::Sheen | LobeKind::Velvet));
+    let is_sheen = |t: &Term| matches!(problem.graph.closure_at(t.closure), Closure::Lobe(kind, ..) if matches!(kind.spec().name, "sheen_bsdf" | "velvet"));
     let texts: Vec<String> = terms.iter().take(2).map(|t| quote(shader, t.span)).collect();
     match terms {
         [a, b, ..] if a.span != b.span => {

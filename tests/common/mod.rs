@@ -172,7 +172,7 @@ fn surfaces(kind: LobeKind) -> Vec<Vec<f32>> {
                 ParamTy::Float => Some(p.min.max(0.0) + (p.max.min(10.0) - p.min.max(0.0)) * t),
                 ParamTy::String => Some((k % 2) as f32),
                 // Black by default, so that no more than half of them transmit.
-                ParamTy::Color if kind == LobeKind::GeneralizedSchlick && p.name == "transmission_tint" => {
+                ParamTy::Color if kind.spec().name == "generalized_schlick_bsdf" && p.name == "transmission_tint" => {
                     Some((k % 2) as f32)
                 }
                 ParamTy::Int => Some((p.min + t * (p.max - p.min)).round()),

@@ -1,4 +1,5 @@
 //! The audit's own tests: are its random trees what it says, does it measure right, does it find what gains?
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::common::{Stack, at, lobe};
 use overcoat::albedo::Precision;

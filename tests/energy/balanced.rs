@@ -1,4 +1,5 @@
 //! The `balanced` rule: lossless and reciprocal where it can be, `min` where not.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::common::at;
 use overcoat::audit::chi2::direction;

@@ -1,4 +1,5 @@
 //! The proof of energy conservation: verdicts on a corpus, held against measurements, and the command.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::engine::Shader;
 use overcoat::ir::Value;

@@ -1,4 +1,5 @@
 //! What once gained energy, found by campaigns of random trees and cut down to what mattered.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::audit::{Side, Tolerance, albedo};
 use overcoat::closure::LayeringRule::{self, Balanced, Min, View};

@@ -1,4 +1,5 @@
 //! The layering rule: hand-made trees where other engines gain energy. Random ones are in tests/energy/audit.rs.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::common::{Stack, at, lobe};
 use overcoat::albedo::Precision;

@@ -1,7 +1,7 @@
 //! The C interface, called as C calls it: right, wrong, and from many threads; then from real C and C++ programs.
 //!
 //! The last tests need a C and a C++ compiler and valgrind.
-#![cfg(feature = "capi")]
+#![cfg(all(feature = "capi", feature = "cloth", feature = "microfacet", feature = "legacy"))]
 #![allow(unsafe_code)]
 
 use overcoat::capi::*;

@@ -1,4 +1,5 @@
 //! Closures that a host brings along are lobes like any other.
+#![cfg(feature = "cloth")]
 
 use crate::common::at;
 use overcoat::audit::{Side, Tolerance, albedo, chi2, reciprocity_error};

@@ -1,4 +1,5 @@
 //! What a host renderer asks of a BSDF: flags, transparency, transport, memory that is used again, trees built in code.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::common::at;
 use overcoat::albedo::Precision;

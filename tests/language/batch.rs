@@ -1,4 +1,5 @@
 //! Many points shaded with one call get, bit for bit, the trees they get one by one.
+#![cfg(feature = "cloth")]
 
 use crate::programs::{LIBRARY, statement};
 use overcoat::Globals;

@@ -1,5 +1,6 @@
 //! The closures people already write: other names mean what they say, keywords and literals are taken, what differs or
 //! is not there says so.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::closure::{ClosureTree, Node, NodeId};
 use overcoat::engine::Tier;

@@ -1,4 +1,5 @@
 //! `Dx` and its kin, where the host says how the globals change from pixel to pixel.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::closure::{ClosureTree, Node};
 use overcoat::ir::{Host, Lookup, Subject, Value};

@@ -1,4 +1,5 @@
 //! What the language asks for beyond the script: included files, budgets, answers of the host, codes of messages.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::closure::{ClosureTree, Node};
 use overcoat::diag::CODES;

@@ -1,5 +1,6 @@
 //! Corners of the language that need more than a value: parameters in parts, loops that the proof follows, loops that
 //! run at the point, random programs of loops and functions, and a replay of the corpus cut and joined.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::programs::{LIBRARY, statement};
 use overcoat::closure::ClosureTree;

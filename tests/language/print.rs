@@ -1,4 +1,5 @@
 //! Printed and parsed again, a script is the same script: operators climb as they should, and nothing written is lost.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::printer::print;
 use crate::programs::{LIBRARY, statement};

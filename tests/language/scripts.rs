@@ -1,4 +1,5 @@
 //! Scripts in, closure trees or messages out.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::Globals;
 use overcoat::closure::{ClosureTree, Node, NodeId};

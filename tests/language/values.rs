@@ -2,6 +2,7 @@
 //!
 //! `zero` stands for a number that is 0: once known early, once read at the point, so that folding and running are held
 //! to the same values.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use overcoat::closure::{ClosureTree, Node};
 use overcoat::{Engine, Globals};

@@ -1,5 +1,6 @@
 //! The bounds of the lobes that follow a thread, at random directions: with all parameters known, and with tables that
 //! were baked without knowing some.
+#![cfg(feature = "cloth")]
 
 use crate::common::{Stack, alone};
 use overcoat::albedo::Precision;

@@ -1,5 +1,6 @@
 //! The tables of the lobes that follow a thread: the standard tier's against the reference tier's, and both against the
 //! albedo as the audit measures it.
+#![cfg(feature = "cloth")]
 
 use crate::common::{Stack, alone};
 use overcoat::albedo::Precision;

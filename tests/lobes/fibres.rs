@@ -1,4 +1,5 @@
 //! The lobes that follow a thread: against reference values, at the thread's poles, and how well they are sampled.
+#![cfg(feature = "cloth")]
 
 use crate::common::{Stack, alone, block, table};
 use overcoat::albedo::Precision;

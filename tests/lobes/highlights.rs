@@ -1,4 +1,5 @@
 //! Phong's and Ward's highlights: bounded at every width, tables true, samples as they say.
+#![cfg(feature = "legacy")]
 
 use crate::common::{Stack, alone, turned};
 use overcoat::albedo::Precision;

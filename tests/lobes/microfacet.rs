@@ -1,4 +1,5 @@
 //! Rough surfaces: nothing is lost at any roughness, from either medium, and smooth ones are the limit.
+#![cfg(feature = "microfacet")]
 
 use crate::common::{Stack, alone, block, turned};
 use overcoat::albedo::Precision;

@@ -1,5 +1,6 @@
 //! How well lobes are sampled: chi-square over roughness and angle, and the variance of f·cos/pdf beside that of
 //! uniform directions. Run with `--nocapture` for the tables.
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::common::{Stack, alone, at, block, lobe};
 use overcoat::albedo::Precision;

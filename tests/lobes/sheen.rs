@@ -1,4 +1,5 @@
 //! The sheen against its double-precision reference tables.
+#![cfg(feature = "cloth")]
 
 use crate::common::{Stack, alone, at, lobe, table};
 use overcoat::albedo::Precision;

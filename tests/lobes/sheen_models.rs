@@ -1,4 +1,5 @@
 //! The sheen models and the velvet against double-precision reference tables.
+#![cfg(feature = "cloth")]
 
 use crate::common::{Stack, alone, at, table};
 use overcoat::albedo::quadrature::Rule;

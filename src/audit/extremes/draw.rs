@@ -77,10 +77,13 @@ impl Block {
                 let base = tree.lobe(LobeKind::Diffuse, DIFFUSE, &defaults(LobeKind::Diffuse));
                 tree.layer(lobe, base)
             }
-            Setting::BelowSheen => {
-                let top = tree.lobe(LobeKind::Sheen, SHEEN, &defaults(LobeKind::Sheen));
-                tree.layer(top, lobe)
-            }
+            Setting::BelowSheen => match LobeKind::by_name("sheen_bsdf") {
+                Some(sheen) => {
+                    let top = tree.lobe(sheen, SHEEN, &defaults(sheen));
+                    tree.layer(top, lobe)
+                }
+                None => lobe,
+            },
         };
         tree.set_root(root);
         tree

@@ -5,8 +5,8 @@ use super::super::builtins::{self, BUILTINS, Eval};
 use super::super::types::Ty;
 use super::{Checker, Typed, suggest};
 use crate::diag::Diagnostic;
-use crate::lobes;
 use crate::lobes::registry::Form;
+use crate::lobes::{self, families};
 use crate::span::Span;
 use crate::syntax::ast::{self, Sym};
 use std::sync::OnceLock;
@@ -224,6 +224,10 @@ impl<'a> Checker<'a> {
     fn unknown_function(&mut self, name: &str, at: Span) -> Typed {
         if let Some((_, why)) = builtins::UNSUPPORTED.iter().find(|(n, _)| *n == name) {
             return self.error(Diagnostic::error("E0109", at, format!("`{name}()` is not supported: {why}")));
+        }
+        if let Some(feature) = families::left_out(name) {
+            let d = Diagnostic::error("E0305", at, format!("the closure `{name}` was left out of this build"));
+            return self.error(d.help(format!("the cargo feature `{feature}` of overcoat brings it")));
         }
         let d = Diagnostic::error("E0206", at, format!("unknown function `{name}`"));
         let own = self.functions.keys().map(|sym| self.ast.name(*sym));
