@@ -4,12 +4,12 @@ mod stacks;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use overcoat::{Globals, Scratch};
+use overcoat::{Engine, Globals, Scratch};
 use stacks::{WO, directions, material, names};
 
 #[divan::bench(args = names())]
 fn shade_and_flatten(bencher: Bencher, name: &str) {
-    let material = material(name);
+    let material = material(&Engine::new(), name);
     let globals = Globals::default();
     bencher
         .bench_local(|| black_box(material.shade(black_box(&globals), black_box(WO.into()))).map(|b| b.lobe_count()));
@@ -18,7 +18,7 @@ fn shade_and_flatten(bencher: Bencher, name: &str) {
 /// [`shade_and_flatten`] into memory that is used again, as a renderer would.
 #[divan::bench(args = names())]
 fn shade_in(bencher: Bencher, name: &str) {
-    let material = material(name);
+    let material = material(&Engine::new(), name);
     let (globals, mut scratch) = (Globals::default(), Scratch::new());
     bencher.bench_local(|| {
         let bsdf = material.shade_in(black_box(&globals), black_box(WO.into()), &mut scratch);
@@ -28,7 +28,7 @@ fn shade_in(bencher: Bencher, name: &str) {
 
 #[divan::bench(args = names())]
 fn eval(bencher: Bencher, name: &str) {
-    let (material, globals, wi) = (material(name), Globals::default(), directions());
+    let (material, globals, wi) = (material(&Engine::new(), name), Globals::default(), directions());
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     bencher.counter(ItemsCount::new(wi.len())).bench_local(|| {
         for w in &wi {
@@ -39,7 +39,7 @@ fn eval(bencher: Bencher, name: &str) {
 
 #[divan::bench(args = names())]
 fn eval_batch(bencher: Bencher, name: &str) {
-    let (material, globals, wi) = (material(name), Globals::default(), directions());
+    let (material, globals, wi) = (material(&Engine::new(), name), Globals::default(), directions());
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     let mut out = vec![bsdf.eval(wi[0]); wi.len()];
     bencher.counter(ItemsCount::new(wi.len())).bench_local(|| bsdf.eval_batch(black_box(&wi), black_box(&mut out)));
@@ -47,7 +47,7 @@ fn eval_batch(bencher: Bencher, name: &str) {
 
 #[divan::bench(args = names())]
 fn sample(bencher: Bencher, name: &str) {
-    let (material, globals, wi) = (material(name), Globals::default(), directions());
+    let (material, globals, wi) = (material(&Engine::new(), name), Globals::default(), directions());
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     bencher.counter(ItemsCount::new(wi.len())).bench_local(|| {
         for w in &wi {

@@ -8,7 +8,7 @@
 
 mod stacks;
 
-use overcoat::{Globals, Material, Scratch};
+use overcoat::{Engine, Globals, Material, Scratch};
 use stacks::{WO, directions, material, names};
 use std::hint::black_box;
 use std::sync::Barrier;
@@ -30,7 +30,7 @@ fn main() {
     counts[1..].iter().for_each(|n| print!("{:>10}", format!("{n} threads")));
     println!();
     for stack in names().filter(|name| wanted.is_empty() || wanted.iter().any(|w| name.contains(w.as_str()))) {
-        let material = material(stack);
+        let material = material(&Engine::new(), stack);
         row(stack, "eval", &counts, &|| evals(&material));
         row(stack, "shade_in", &counts, &|| points(&material));
     }

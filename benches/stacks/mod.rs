@@ -25,11 +25,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     STACKS.iter().map(|s| s.0)
 }
 
-/// One of them, its tables baked.
-pub fn material(name: &str) -> Material {
+/// One of them, its tables baked as the engine has it.
+pub fn material(engine: &Engine, name: &str) -> Material {
     let text = STACKS.iter().find(|s| s.0 == name).expect("a stack").1;
-    let shader = Engine::new().compile(name, text).expect("compiles");
-    shader.material(&[]).expect("specialises")
+    engine.material(name, text).expect("compiles")
 }
 
 /// Toward the viewer.
