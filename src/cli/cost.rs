@@ -2,7 +2,7 @@
 
 use super::{Failure, Global, Outcome, output};
 use crate::audit::clock::{self, nanoseconds};
-use crate::closure::ClosureTree;
+use crate::closure::{ClosureTree, Scratch};
 use crate::engine::Material;
 use crate::globals::Globals;
 use serde_json::{Value, json};
@@ -36,8 +36,10 @@ pub(super) fn measure(material: &Material) -> Result<Value, Failure> {
     let shade = nanoseconds(|| {
         let _ = black_box(program.shade(black_box(&globals_at), &mut tree));
     });
+    // Into memory that is used again, as renderers do.
+    let mut scratch = Scratch::new();
     let setup = nanoseconds(|| {
-        black_box(material.shade(black_box(&globals_at), black_box(wo)).is_ok());
+        black_box(material.shade_in(black_box(&globals_at), black_box(wo), &mut scratch).is_ok());
     });
     let ((eval, sample), batch) = (clock::calls(&bsdf), clock::batch(&bsdf));
     let round = |x: f64| (x * 10.0).round() / 10.0;
