@@ -8,6 +8,7 @@
 //! would call each instruction.
 #![allow(unsafe_code)]
 
+use super::dispatch::Work;
 use super::elementary::{self, Bits, Single};
 use super::lanes::{F32x8, Lanes};
 use super::octaves;
@@ -408,6 +409,16 @@ impl Lanes for Avx {
             avx!(_mm_storeu_ps(rows[i + 4].as_mut_ptr(), _mm256_extractf128_ps::<1>(both)));
         }
         rows
+    }
+
+    #[inline(always)]
+    fn apart<W: Work>(work: W) -> W::Output {
+        #[inline(never)]
+        #[target_feature(enable = "avx2")]
+        fn avx2<W: Work>(work: W) -> W::Output {
+            work.run()
+        }
+        avx!(avx2(work))
     }
 }
 

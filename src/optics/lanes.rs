@@ -2,6 +2,7 @@
 //!
 //! What is read into lanes, and back, is [`Lanes`]: here for any processor, in `avx` for those with AVX2.
 
+use super::dispatch::Work;
 use super::real::{Lift, Real, Scalar};
 use super::vec3::V3;
 use super::{elementary, octaves};
@@ -201,6 +202,8 @@ pub(crate) trait Lanes: Real<Entry = f32> + Lift<f32> {
     fn load(rows: &[[f32; 3]; 8]) -> V3<Self>;
     /// Eight rows of four columns.
     fn store(columns: [Self; 4]) -> [[f32; 4]; 8];
+    /// Does `work` in a function of its own, compiled for these lanes: compilers take long over functions that are long.
+    fn apart<W: Work>(work: W) -> W::Output;
 }
 
 impl Lanes for F32x8 {
@@ -212,6 +215,10 @@ impl Lanes for F32x8 {
     #[inline(always)]
     fn store(columns: [Self; 4]) -> [[f32; 4]; 8] {
         std::array::from_fn(|i| columns.map(|c| c.0[i]))
+    }
+    #[inline(never)]
+    fn apart<W: Work>(work: W) -> W::Output {
+        work.run()
     }
 }
 
