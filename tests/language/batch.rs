@@ -1,5 +1,5 @@
 //! Many points shaded with one call get, bit for bit, the trees they get one by one.
-#![cfg(feature = "cloth")]
+#![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
 use crate::programs::{LIBRARY, statement};
 use overcoat::Globals;

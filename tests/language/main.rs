@@ -7,7 +7,9 @@ mod derivatives;
 mod host;
 mod more;
 mod print;
+#[cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 mod printer;
+#[cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 mod programs;
 mod scripts;
 mod table;
