@@ -8,6 +8,8 @@ mod baked;
 mod error;
 mod owned;
 mod parts;
+#[cfg(test)]
+mod tests;
 mod values;
 
 pub use crate::closure::Scratch;

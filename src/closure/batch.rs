@@ -32,6 +32,14 @@ impl Bsdf<'_, f32> {
     }
 }
 
+#[cfg(all(test, feature = "cloth", feature = "microfacet", feature = "legacy"))]
+impl Bsdf<'_, f32> {
+    /// [`eval_batch`](Self::eval_batch) in arrays, as on a processor without vectors of its own; for eight directions or more.
+    pub(crate) fn eval_batch_in_arrays(&self, wi: &[[f32; 3]], out: &mut [Eval]) {
+        dispatch::LaneWork::run::<F32x8>(Batch { bsdf: self, wi, out });
+    }
+}
+
 /// The work of [`Bsdf::eval_batch`], compiled for each instruction set that is chosen from at run time.
 struct Batch<'a, 'm> {
     bsdf: &'a Bsdf<'m>,
@@ -249,46 +257,6 @@ impl<'a, 'm, L: Lanes> Deep<'a, 'm, L> {
         }
         for (block, stack) in blocks.iter_mut().zip(stacks) {
             block.scale = stack.scale()[0];
-        }
-    }
-}
-
-#[cfg(all(test, feature = "cloth", feature = "microfacet"))]
-mod tests {
-    use super::*;
-    use crate::closure::LayeringRule;
-    use crate::optics::dispatch::LaneWork;
-    use crate::{Engine, Globals};
-
-    #[test]
-    fn lanes_of_any_processor_give_what_single_calls_give() {
-        let scripts = [
-            "Ci = sheen(0.7 * diffuse(N), N, color(0.3, 0.4, 0.5), 0.4);",
-            "Ci = sheen(0.7 * oren_nayar(N, 0.2), N, color(0.3, 0.4, 0.5), 0.1 + 0.8 * u);",
-            "Ci = layer(dielectric_bsdf(N, dPdu, 1, 1, 0.3, 0.3, 1.5, \"ggx\"), eon(N, color(0.8), 0.5));",
-            "Ci = layer(layer(sheen(N, 0.3), 0.5 * velvet(N, 0.3)), fabric(normal(0, 0.6, 0.8), dPdu, 0.3));",
-            "Ci = microcylinder(N, dPdu, \"denim\") + 0.2 * translucent(N);",
-        ];
-        let wi: Vec<[f32; 3]> = (0..77)
-            .map(|k| V3::polar(1.0 - k as f32 * 0.02, k as f32 * 0.7))
-            .map(|w| [w.x, w.y, w.z])
-            .chain([[f32::NAN, 0.0, 1.0], [0.0; 3], [3.0, 0.0, 0.0]])
-            .collect();
-        for script in scripts {
-            for rule in LayeringRule::ALL {
-                let material = Engine::new().layering(rule).material("m", script).expect(script);
-                let globals = Globals { u: 0.3, ..Globals::default() };
-                let bsdf = material.shade(&globals, glam::vec3(0.48, 0.36, 0.8)).expect("small");
-                let single: Vec<Eval> = wi.iter().map(|w| bsdf.eval(*w)).collect();
-                for count in [8, 13, 64, wi.len()] {
-                    let black = Eval { f_cos: [-1.0; 3], pdf: -1.0 };
-                    let (mut portable, mut widest) = (vec![black; count], vec![black; count]);
-                    Batch { bsdf: &bsdf, wi: &wi[..count], out: &mut portable }.run::<F32x8>();
-                    bsdf.eval_batch(&wi, &mut widest);
-                    assert_eq!(portable, single[..count], "{script} {rule:?}");
-                    assert_eq!(widest, single[..count], "{script} {rule:?}");
-                }
-            }
         }
     }
 }

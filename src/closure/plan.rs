@@ -168,11 +168,6 @@ impl<S: Scalar> Plan<S> {
         }
         bsdf.finish();
     }
-
-    /// Memory it takes.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&*self.frames) + size_of_val(&*self.lobes) + size_of_val(&*self.layers) + size_of_val(&*self.ops)
-    }
 }
 
 /// Whether a layering is one that plans are for.

@@ -44,23 +44,3 @@ impl<S: Scalar> Default for Scratch<'_, S> {
         Scratch::new()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Engine, Globals};
-
-    #[test]
-    fn nothing_is_left_of_the_point_before() {
-        let material =
-            Engine::new().material("m", "Ci = holdout() + 0.5 * diffuse(N) + u * emission();").expect("a script");
-        let mut scratch = Scratch::new();
-        for u in [0.5, 0.0, 1.0] {
-            let globals = Globals { u, ..Globals::default() };
-            let bsdf = material.shade_in(&globals, glam::Vec3::Z, &mut scratch).expect("small");
-            let alone = material.shade(&globals, glam::Vec3::Z).expect("small");
-            assert_eq!(bsdf.signals(), alone.signals());
-            assert_eq!((bsdf.emission(), bsdf.lobe_count()), (alone.emission(), alone.lobe_count()));
-        }
-    }
-}

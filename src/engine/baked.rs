@@ -33,9 +33,7 @@ impl<S: Scalar> Baked<S> {
     }
 
     pub fn bytes(&self) -> usize {
-        self.curves.bytes()
-            + self.balance.as_ref().map_or(0, Balance::bytes)
-            + self.plan.as_ref().map_or(0, Plan::bytes)
+        self.curves.bytes() + self.balance.as_ref().map_or(0, Balance::bytes)
     }
 }
 
@@ -104,7 +102,7 @@ fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, pre
     balancer.solve_pairs(&sites, pairs, tint, curves)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cloth", feature = "microfacet", feature = "legacy"))]
 mod tests {
     use super::*;
     use crate::engine::{Engine, Material};
