@@ -12,7 +12,7 @@ fn lanes_of_any_processor_give_what_single_calls_give() {
         "Ci = sheen(0.7 * oren_nayar(N, 0.2), N, color(0.3, 0.4, 0.5), 0.1 + 0.8 * u);",
         "Ci = layer(dielectric_bsdf(N, dPdu, 1, 1, 0.3, 0.3, 1.5, \"ggx\"), eon(N, color(0.8), 0.5));",
         "Ci = layer(layer(sheen(N, 0.3), 0.5 * velvet(N, 0.3)), fabric(normal(0, 0.6, 0.8), dPdu, 0.3));",
-        "Ci = microcylinder(N, dPdu, \"denim\") + 0.2 * translucent(N);",
+        "Ci = microcylinder(N, dPdu, \"linen\") + 0.2 * translucent(N);",
     ];
     let wi: Vec<[f32; 3]> = (0..77)
         .map(|k| V3::polar(1.0 - k as f32 * 0.02, k as f32 * 0.7))
