@@ -1,6 +1,6 @@
 //! What a lobe of known parameters reads in one place: its own functions of a cosine beside its albedos.
 
-/// Tables of [`octaves`](crate::optics::octaves) in single precision; what the functions are, the lobe knows.
+/// Tables of `optics::octaves` in single precision; what the functions are, the lobe knows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
     /// Over sin² of the half vector's angle: a cubic. 64 octaves of 16 cells.

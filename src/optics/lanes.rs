@@ -1,6 +1,6 @@
 //! `Real` for f64, f32 and eight f32 side by side.
 //!
-//! What is read into lanes, and back, is [`Lanes`]: here for any processor, in `avx` for those with AVX2.
+//! What is read into lanes, and back, is `Lanes`: here for any processor, in `avx` for those with AVX2.
 
 use super::dispatch::Work;
 use super::real::{Lift, Real, Scalar};

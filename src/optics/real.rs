@@ -111,7 +111,7 @@ pub trait Real:
         array(|k| Self::gather(table, index + Self::c(k as f64)))
     }
 
-    /// What a table of [`octaves`](super::octaves) holds for `x`, |x| ≤ 1: a row of its `CELLS`, 2^`DIGITS` to each of
+    /// What a table of `octaves` holds for `x`, |x| ≤ 1: a row of its `CELLS`, 2^`DIGITS` to each of
     /// `OCTAVES` octaves below 1, and where in the cell `x` lies. `None` if the type has more digits than such a table.
     #[inline(always)]
     fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(
@@ -169,7 +169,7 @@ pub trait Real:
 
 /// One number type for a single value, as opposed to lanes: what a BSDF is built in.
 pub trait Scalar: Real<Mask = bool, Entry = Self> + PartialOrd + Default {
-    /// Whether it is single precision, which tables of [`octaves`](super::octaves) are for.
+    /// Whether it is single precision, which tables of `octaves` are for.
     const SINGLE: bool = false;
     /// In double precision.
     fn to_f64(self) -> f64;
