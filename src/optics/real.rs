@@ -223,7 +223,7 @@ macro_rules! rgb {
 }
 pub(crate) use rgb;
 
-/// `values` brought into another type; see [`array`].
+/// `values` brought into another type; see [`array()`].
 #[inline(always)]
 pub fn lifted<S: Copy, L: Real + Lift<S>, const N: usize>(values: [S; N]) -> [L; N] {
     array(|i| L::lift(values[i]))
