@@ -70,3 +70,17 @@ impl Default for Globals {
         }
     }
 }
+
+impl Globals {
+    /// A point where no two directions coincide: what is alike there comes from the same place everywhere.
+    pub(crate) fn apart() -> Globals {
+        Globals {
+            n: Vec3::new(0.13, -0.21, 0.97),
+            ng: Vec3::new(-0.31, 0.17, 0.94),
+            dpdu: Vec3::new(0.91, 0.37, 0.19),
+            dpdv: Vec3::new(-0.41, 0.88, 0.23),
+            p: Vec3::new(0.29, 0.53, -0.67),
+            ..Globals::default()
+        }
+    }
+}

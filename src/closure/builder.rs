@@ -396,11 +396,11 @@ impl Builder {
         let plan = Plan { id, layering, steps, sites, inputs, root, curves, balance: None };
         let mut composite = Composite { plan: Arc::new(plan) };
         let mut tree = ClosureTree::new();
-        composite.tree(&apart(), &composite.inputs(), &mut tree);
+        composite.tree(&Globals::apart(), &composite.inputs(), &mut tree);
         tree.within_budget()?;
         let plan = &composite.plan;
         if layering.rule == LayeringRule::Balanced && plan.inputs.is_empty() {
-            let solved = Balancer::new(precision).solve(&tree, &apart(), layering.tint, &plan.curves);
+            let solved = Balancer::new(precision).solve(&tree, &Globals::apart(), layering.tint, &plan.curves);
             if let Some(plan) = Arc::get_mut(&mut composite.plan) {
                 plan.balance = Some(solved);
             }
@@ -420,17 +420,6 @@ impl Builder {
     fn refuse(&mut self, wrong: BuildError) -> Part {
         self.wrong.get_or_insert(wrong);
         self.zero()
-    }
-}
-
-/// A shading point whose directions all differ: lobes share a normal there only if they do everywhere.
-fn apart() -> Globals {
-    Globals {
-        n: Vec3::new(0.13, -0.21, 0.97),
-        ng: Vec3::new(-0.31, 0.17, 0.94),
-        dpdu: Vec3::new(0.91, 0.37, 0.19),
-        dpdv: Vec3::new(-0.41, 0.88, 0.23),
-        ..Globals::default()
     }
 }
 

@@ -98,7 +98,7 @@ impl<S: Scalar> Plan<S> {
             if l.frame as usize == frames.len() {
                 frames.push(axes);
             }
-            // Those whose parameters are not all known are made anew at each point.
+            // Turned from what is known of its site: all its parameters but directions.
             curves.at(l.site).1?;
             let kind = l.lobe.kind();
             let (weight, weight_in_top) = (l.share, l.weight_in_top);

@@ -37,18 +37,6 @@ impl<S: Scalar> Baked<S> {
     }
 }
 
-/// A point where no two globals coincide: directions are told apart by where they come from.
-fn apart() -> Globals {
-    Globals {
-        n: Vec3::new(0.13, -0.21, 0.97),
-        ng: Vec3::new(-0.31, 0.17, 0.94),
-        dpdu: Vec3::new(0.91, 0.37, 0.19),
-        dpdv: Vec3::new(-0.41, 0.88, 0.23),
-        p: Vec3::new(0.29, 0.53, -0.67),
-        ..Globals::default()
-    }
-}
-
 /// The plan of a constant program, if its tree has one.
 fn planned<S: Scalar>(program: &Program, layering: Layering, curves: &Curves<S>) -> Option<Plan<S>> {
     let kept = program.kept()?.as_ref().ok()?;
@@ -57,7 +45,7 @@ fn planned<S: Scalar>(program: &Program, layering: Layering, curves: &Curves<S>)
         return None;
     }
     // Seen from the back, lobes between media turn N: they share a frame with others only where they always do.
-    let globals = Globals { backfacing: true, ..apart() };
+    let globals = Globals { backfacing: true, ..Globals::apart() };
     let mut tree = ClosureTree::new();
     kept.give(&globals, &mut tree);
     let bsdf = flatten(&tree, &globals, V3::from_f32(globals.n.to_array()), layering, curves).ok()?;
@@ -89,7 +77,7 @@ fn planned<S: Scalar>(program: &Program, layering: Layering, curves: &Curves<S>)
 fn balance<S: Scalar>(program: &Program, tint: TintRule, curves: &Curves<S>, precision: Precision) -> Balance<S> {
     let balancer = Balancer::new(precision);
     if program.is_constant() {
-        let globals = apart();
+        let globals = Globals::apart();
         let mut tree = ClosureTree::new();
         // A tree beyond a budget is black here, and an error wherever it is shaded.
         let _ = program.shade(&globals, &mut tree);
