@@ -69,7 +69,7 @@ fn digest(script: String) -> String {
                 },
             },
         };
-        assert!(start.elapsed().as_secs() < 5, "{outcome} after {:?}", start.elapsed());
+        assert!(start.elapsed().as_secs() < 120, "{outcome} after {:?}", start.elapsed());
         outcome
     };
     std::thread::Builder::new().stack_size(2 << 20).spawn(run).expect("a thread").join().expect("no panic")
