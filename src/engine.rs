@@ -21,7 +21,8 @@ use self::baked::Baked;
 use crate::Globals;
 use crate::albedo::Precision;
 use crate::closure::{
-    Balance, Bsdf, Builder, ClosureTree, Layering, LayeringRule, TableCache, Tables, TintRule, flatten, flatten_into,
+    Balance, Bsdf, Bsdfs, Builder, ClosureTree, Layering, LayeringRule, TableCache, Tables, TintRule, flatten,
+    flatten_into,
 };
 use crate::diag::Diagnostic;
 use crate::ir::{self, Batch, CheckedShader, Host, ParamDecl, Program, Value};
@@ -29,7 +30,7 @@ use crate::lobes::host::{ClosureSpec, HostKind, HostLobe, RegisterError};
 use crate::lobes::registry::{Build, ClosureParams, Form};
 use crate::lobes::subsurface::{self, SubsurfaceParams};
 use crate::lobes::{self, LobeKind};
-use crate::optics::{Scalar, V3};
+use crate::optics::{Scalar, V3, dispatch};
 use crate::span::Source;
 use crate::syntax::{Includes, Limits, Options};
 use glam::Vec3;
@@ -437,6 +438,7 @@ impl Material {
     ///
     /// # Errors
     /// If the closure tree goes beyond a budget; the BSDF in `scratch` is then black.
+    #[inline]
     pub fn shade_in<'m, 's>(
         &'m self,
         globals: &Globals,
@@ -444,19 +446,74 @@ impl Material {
         scratch: &'s mut Scratch<'m>,
     ) -> Result<&'s Bsdf<'m>, ShadeError> {
         let Scratch { tree, bsdf } = scratch;
-        let Baked { curves, balance, plan, .. } = &self.inner.tables;
-        if let Some(plan) = plan {
-            plan.turn(globals, V3::from_f32(wo.to_array()), curves, bsdf);
-            return Ok(bsdf);
+        self.shade_with(globals, wo, tree, bsdf)?;
+        Ok(bsdf)
+    }
+
+    #[inline(always)]
+    fn shade_with<'m>(
+        &'m self,
+        globals: &Globals,
+        wo: Vec3,
+        tree: &mut ClosureTree,
+        bsdf: &mut Bsdf<'m>,
+    ) -> Result<(), ShadeError> {
+        let Baked { curves, plan, .. } = &self.inner.tables;
+        let wo = V3::from_f32(wo.to_array());
+        match plan {
+            Some(plan) => {
+                plan.turn(globals, wo, curves, bsdf);
+                Ok(())
+            }
+            None => self.shade_tree(globals, wo, tree, bsdf),
         }
-        let globals = Globals { i: -wo, ..*globals };
+    }
+
+    /// By the program and its tree. Apart, so that a plan is a short way off.
+    #[inline(never)]
+    fn shade_tree<'m>(
+        &'m self,
+        globals: &Globals,
+        wo: V3<f32>,
+        tree: &mut ClosureTree,
+        bsdf: &mut Bsdf<'m>,
+    ) -> Result<(), ShadeError> {
+        let Baked { curves, balance, .. } = &self.inner.tables;
+        let globals = Globals { i: -Vec3::new(wo.x, wo.y, wo.z), ..*globals };
         let shaded = self.inner.program.shade(&globals, tree);
         if shaded.is_err() {
             tree.clear();
         }
         let tables = Tables { curves, balance: balance.as_ref() };
-        flatten_into(tree, &globals, V3::from_f32(wo.to_array()), self.engine().layering, tables, bsdf)?;
-        shaded.map(|()| &*bsdf)
+        flatten_into(tree, &globals, wo, self.engine().layering, tables, bsdf)?;
+        shaded
+    }
+
+    /// The BSDFs at many points, each seen from its `wo` as [`shade`](Self::shade) takes it. Where this material always makes
+    /// the same tree, they stand side by side in vectors; see [`Bsdfs`]. There are as many as the shorter of the two has.
+    ///
+    /// # Errors
+    /// If a closure tree goes beyond a budget; `bsdfs` is then empty.
+    pub fn shade_many<'m>(
+        &'m self,
+        points: &[Globals],
+        wo: &[[f32; 3]],
+        bsdfs: &mut Bsdfs<'m>,
+    ) -> Result<(), ShadeError> {
+        let count = points.len().min(wo.len());
+        let (points, wo) = (&points[..count], &wo[..count]);
+        if let Some(plan) = self.inner.tables.plan.as_ref().filter(|_| dispatch::has_lanes()) {
+            bsdfs.turn(plan, &self.inner.tables.curves, points, wo);
+            return Ok(());
+        }
+        let (each, tree) = bsdfs.apart(count);
+        let mut shade =
+            |((globals, wo), bsdf): ((&Globals, &[f32; 3]), _)| self.shade_with(globals, (*wo).into(), tree, bsdf);
+        let shaded = points.iter().zip(wo).zip(each).try_for_each(&mut shade);
+        if shaded.is_err() {
+            bsdfs.clear();
+        }
+        shaded
     }
 
     /// The closure trees at many points, several of them worked out side by side: less work per point than

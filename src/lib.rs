@@ -74,5 +74,6 @@ pub mod prove;
 pub mod span;
 pub mod syntax;
 
+pub use closure::Bsdfs;
 pub use engine::{Engine, Error, Material, OwnedBsdf, Scratch, Shader};
 pub use globals::{Differentials, Globals};

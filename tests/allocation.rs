@@ -68,12 +68,17 @@ fn batches_leave_the_heap_alone_once_they_have_grown() {
         let material = shader.material(&[]).expect("specialises");
         let at = |k: usize| Globals { u: 0.03 * k as f32, v: (k % 2) as f32, ..Globals::default() };
         let points: Vec<Globals> = (0..30).map(at).collect();
-        let mut batch = overcoat::ir::Batch::new();
+        let directions = [[0.6, 0.0, 0.8]; 30];
+        let (mut batch, mut bsdfs) = (overcoat::ir::Batch::new(), overcoat::Bsdfs::new());
+        let mut out = [overcoat::closure::Eval::default(); 30];
         material.shade_batch(&points, &mut batch);
+        material.shade_many(&points, &directions, &mut bsdfs).expect("small");
         let count = allocations(|| {
             for k in 0..10 {
                 material.shade_batch(&points[k..], &mut batch);
                 material.shade_batch(&points[k..], &mut batch);
+                material.shade_many(&points[k..], &directions, &mut bsdfs).expect("small");
+                bsdfs.eval(&directions, &mut out);
             }
         });
         assert_eq!(count, 0, "{script}");

@@ -108,6 +108,7 @@ impl<S: Scalar> FacetTables<S> {
     }
 
     /// Albedo of each part; 0 where `missing` is.
+    #[inline(always)]
     pub fn view<L: Over<S>>(&self, w: V3<L>) -> [L; PARTS] {
         self.parts_of(&self.view, w)
     }

@@ -253,6 +253,9 @@ impl Real for DoubleDouble {
     fn le(self, o: Self) -> bool {
         self <= o
     }
+    fn any(mask: bool) -> bool {
+        mask
+    }
     fn select(mask: bool, a: Self, b: Self) -> Self {
         if mask { a } else { b }
     }

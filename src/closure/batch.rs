@@ -8,14 +8,14 @@ use super::flatten::Layering;
 use super::layer::{FlatStack, LayerStack, TintRule};
 use crate::albedo::AlbedoCurve;
 use crate::lobes::host::Host;
-use crate::lobes::{Evaluated, Lobe, LobeVisitor};
+use crate::lobes::{Evaluated, Listed, Lobe, LobeVisitor};
 use crate::optics::{F32x8, Lanes, Lift, V3, array, dispatch};
 
 /// How many layers may be open at once for directions to be worked on side by side.
 const DEPTH: usize = 4;
-const LANES: usize = F32x8::LANES;
+pub(super) const LANES: usize = F32x8::LANES;
 /// Eights per visit of a lobe.
-const BLOCKS: usize = 8;
+pub(super) const BLOCKS: usize = 8;
 
 impl Bsdf<'_, f32> {
     /// [`eval`](Self::eval) of many directions at once. Gives bit for bit what `eval` gives, however many there are. Like a
@@ -78,25 +78,25 @@ impl dispatch::LaneWork for Batch<'_, '_> {
 
 /// What goes from lobe to lobe of eight directions.
 #[derive(Clone, Copy)]
-struct Block<L> {
-    wi: V3<L>,
+pub(super) struct Block<L> {
+    pub wi: V3<L>,
     /// In the frame of the lobe.
-    local: V3<L>,
-    stack: FlatStack<L>,
+    pub local: V3<L>,
+    pub stack: FlatStack<L>,
     /// What the layers above the lobe leave of it.
-    scale: L,
-    sum: [L; 4],
+    pub scale: L,
+    pub sum: [L; 4],
 }
 
 impl<L: Lanes> Block<L> {
     #[inline(always)]
-    fn black() -> Self {
+    pub fn black() -> Self {
         let nowhere = V3::new(L::zero(), L::zero(), L::zero());
         Block { wi: nowhere, local: nowhere, stack: FlatStack::default(), scale: L::one(), sum: [L::zero(); 4] }
     }
 
     #[inline(always)]
-    fn store(&self, out: &mut [Eval; LANES]) {
+    pub fn store(&self, out: &mut [Eval; LANES]) {
         let rows = L::store(array(|k| finite(self.sum[k])));
         for i in 0..LANES {
             let [r, g, b, pdf] = rows[i];
@@ -169,14 +169,14 @@ trait Evaluate<L> {
     fn toward(&self, wi: V3<L>) -> Evaluated<L>;
 }
 
-/// A lobe of the list.
-struct Listed<'a, B> {
+/// A lobe of the list, its table and whether its bound is asked for.
+struct AtCurve<'a, B> {
     lobe: &'a B,
     curve: &'a AlbedoCurve<f32>,
     bound: bool,
 }
 
-impl<L: Lanes, B: Lobe<f32>> Evaluate<L> for Listed<'_, B> {
+impl<L: Lanes, B: Lobe<f32>> Evaluate<L> for AtCurve<'_, B> {
     #[inline(always)]
     fn toward(&self, wi: V3<L>) -> Evaluated<L> {
         self.lobe.evaluate(wi, self.curve, self.bound)
@@ -207,9 +207,9 @@ impl<L: Lanes, B: Evaluate<L>> dispatch::Work for Added<'_, '_, L, B> {
 
 impl<L: Lanes> LobeVisitor<f32> for Visit<'_, '_, L> {
     #[inline(always)]
-    fn scattering(self, lobe: &impl Lobe<f32>) {
+    fn scattering<B: Lobe<f32> + Listed<f32>>(self, lobe: &B) {
         let (curve, bound) = (self.l.curve, self.l.in_top);
-        L::apart(Added { visit: self, lobe: Listed { lobe, curve, bound } });
+        L::apart(Added { visit: self, lobe: AtCurve { lobe, curve, bound } });
     }
 
     #[inline(always)]

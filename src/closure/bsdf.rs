@@ -14,7 +14,7 @@ use crate::optics::{Frame, Over, Real, Scalar, V3, array, rgb};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Eval<S = f32> {
     /// Σ w·f·|N·ωi| per channel, each lobe with its own normal; delta lobes left out.
@@ -61,7 +61,7 @@ pub(crate) struct FlatLobe<'m, S: Real> {
     /// f and pdf are worked out side by side.
     pub share: [S; 4],
     pub lobe: AnyLobe<S>,
-    pub curve: &'m AlbedoCurve<S>,
+    pub curve: &'m AlbedoCurve<S::Entry>,
     pub site: u32,
     pub frame: u32,
     /// From the root of the innermost top; the fourth is idle.
@@ -108,6 +108,7 @@ pub(crate) enum Op {
 #[derive(Clone, Debug)]
 pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) wo: V3<S>,
+    /// As given, of any length.
     pub(super) ng: V3<S>,
     pub(crate) layering: Layering,
     /// The most layers open at once.
@@ -115,18 +116,21 @@ pub struct Bsdf<'m, S: Real = f32> {
     /// Whether [`FlatStack`] will do for its layers, as far as the tree goes.
     pub(super) flat: bool,
     pub(crate) ops: SmallVec<[Op; 32]>,
+    /// Whether there may be anything in what plans never fill: ops, balances, emission, signals.
+    pub(super) filled: bool,
     /// In place of them, for a tree that was written out before.
     pub(super) planned_ops: &'m [Op],
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
     /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
     pub(super) balanced: SmallVec<[Option<Balanced<'m, S>>; 8]>,
     pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
+    /// One for all lobes that share a normal and a tangent.
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
     pub(crate) signals: SmallVec<[Signal<S>; 8]>,
 }
 
-impl<'m, S: Scalar> Bsdf<'m, S> {
+impl<'m, S: Real> Bsdf<'m, S> {
     /// A BSDF that scatters nothing.
     pub fn black() -> Self {
         let zero = V3::new(S::zero(), S::zero(), S::zero());
@@ -137,6 +141,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             depth: 0,
             flat: true,
             ops: SmallVec::new(),
+            filled: false,
             planned_ops: &[],
             lobes: SmallVec::new(),
             balanced: SmallVec::new(),
@@ -152,11 +157,20 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
         self.flat = true;
         self.planned_ops = &[];
-        empty(&mut self.ops);
         empty(&mut self.lobes);
-        empty(&mut self.balanced);
         empty(&mut self.layers);
         empty(&mut self.frames);
+        if self.filled {
+            self.filled = false;
+            self.empty_more();
+        }
+    }
+
+    /// What plans never fill.
+    #[inline(never)]
+    fn empty_more(&mut self) {
+        empty(&mut self.ops);
+        empty(&mut self.balanced);
         self.emission = [S::zero(); 3];
         empty(&mut self.signals);
     }
@@ -166,15 +180,21 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         if self.planned_ops.is_empty() { &self.ops } else { self.planned_ops }
     }
 
-    /// Turns estimated albedos into probabilities and drops nothing.
+    /// Turns estimated albedos, which add up to `total`, into probabilities and drops nothing.
     #[inline(always)]
-    pub(crate) fn finish(&mut self) {
+    pub(super) fn share_out(&mut self, total: S) {
         // Until now the estimates themselves, by their largest channel.
-        let total = self.lobes.iter().fold(S::zero(), |sum, l| sum + l.share[3]);
-        let even = if total > S::zero() { None } else { Some(S::one() / S::c(self.lobes.len() as f64)) };
+        let even = S::one() / S::c(self.lobes.len() as f64);
         for l in &mut self.lobes {
-            l.share[3] = even.unwrap_or(l.share[3] / total);
+            l.share[3] = S::select(total.gt(S::zero()), l.share[3] / total, even);
         }
+    }
+}
+
+impl<'m, S: Scalar> Bsdf<'m, S> {
+    /// What is left to do when the list is whole.
+    pub(super) fn finish(&mut self) {
+        self.share_out(self.lobes.iter().fold(S::zero(), |sum, l| sum + l.share[3]));
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
         for s in &mut self.signals {
             s.value = s.value.map(|v| v.min(S::c(1e30)));
@@ -185,8 +205,16 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     ///
     /// `wi`: world space, unit, away from the surface. A direction that is not finite, or shorter than ½ or longer than
     /// 2, gives black and pdf 0.
+    #[inline]
     pub fn eval(&self, wi: impl Into<[S; 3]>) -> Eval<S> {
-        self.eval_own(vector(wi.into()), usize::MAX).0
+        let [x, y, z] = wi.into();
+        self.eval_toward(x, y, z)
+    }
+
+    /// [`eval`](Self::eval), the direction in registers: three numbers that a caller has just put down one by one cannot be
+    /// picked up as two before they have arrived.
+    fn eval_toward(&self, x: S, y: S, z: S) -> Eval<S> {
+        self.eval_own(V3::new(x, y, z), usize::MAX).0
     }
 
     /// [`eval`](Self::eval), and the density of lobe `own` alone (0 if there is none of that index).
@@ -197,7 +225,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
             if self.is_flat() {
                 self.walk_flat(wi, &mut sum);
             } else {
-                self.eval_deep(wi, &mut sum);
+                self.eval_deep(wi.apart(), &mut sum);
             }
         }
         // All four alike, so that they are written as one.
@@ -230,33 +258,52 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// Draws a direction from three uniform numbers in [0, 1): two for the direction, one to choose the lobe.
     /// `None` where nothing is scattered that way (a black BSDF, a direction below the horizon).
+    #[inline]
     pub fn sample(&self, u: [S; 3]) -> Option<Sample<S>> {
-        let index = self.choose(u[2])?;
+        let [u0, u1, choice] = u;
+        self.sample_for(u0, u1, choice)
+    }
+
+    /// [`sample`](Self::sample), its numbers in registers: see [`eval_toward`](Self::eval_toward).
+    fn sample_for(&self, u0: S, u1: S, choice: S) -> Option<Sample<S>> {
+        let index = self.choose(choice)?;
         let l = &self.lobes[index];
-        let frame = &self.frames[l.frame as usize];
-        let transmit = |wi: V3<S>| (self.ng.dot(wi) * self.ng.dot(self.wo)).lt(S::zero());
         if l.delta {
-            let (local, _) = l.lobe.delta()?;
-            let wi = frame.to_world(local);
-            if !is_unit(wi) {
-                // Seen along no direction, it has none to send light to.
-                return None;
-            }
-            let f_cos = self.lobe_delta(index, true)?;
-            let flags = SampleFlags { transmit: transmit(wi), delta: true, ..SampleFlags::default() };
-            return Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local);
+            return self.sample_delta(index, l);
         }
-        let local = l.lobe.sample([u[0], u[1]]);
+        let local = l.lobe.sample([u0, u1]).apart();
         if local.z == S::zero() {
             // No direction at all; turned to the world, rounding would put it on either side.
             return None;
         }
-        let wi = frame.to_world(local);
+        let wi = self.frames[l.frame as usize].to_world(local);
         let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
-        let flags = SampleFlags { transmit: transmit(wi), delta: false, subsurface };
+        let flags = SampleFlags { transmit: self.crosses(wi), delta: false, subsurface };
         // Where the lobe's own density is 0, as below a horizon, another lobe may scatter, but the sample is not one of its own.
         let (eval, own) = self.eval_own(wi, index);
         if own > S::zero() { Self::sampled(wi, eval, flags, l, local) } else { None }
+    }
+
+    #[inline(never)]
+    fn sample_delta(&self, index: usize, l: &FlatLobe<'m, S>) -> Option<Sample<S>> {
+        let (local, _) = l.lobe.delta()?;
+        let wi = self.frames[l.frame as usize].to_world(local);
+        if !is_unit(wi) {
+            // Seen along no direction, it has none to send light to.
+            return None;
+        }
+        let f_cos = self.lobe_delta(index, true)?;
+        let flags = SampleFlags { transmit: self.crosses(wi), delta: true, ..SampleFlags::default() };
+        Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local)
+    }
+
+    /// Whether ωi lies on the other side of the geometric surface than ωo.
+    #[inline(always)]
+    fn crosses(&self, wi: V3<S>) -> bool {
+        let (i, o) = (self.ng.dot(wi), self.ng.dot(self.wo));
+        // By sign, whatever its length; one that is not finite has no sides.
+        let apart = (i.lt(S::zero()) & o.gt(S::zero())) | (i.gt(S::zero()) & o.lt(S::zero()));
+        apart && i.is_finite() && o.is_finite()
     }
 
     /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
@@ -266,6 +313,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         }
     }
 
+    #[inline(always)]
     fn sampled(
         wi: V3<S>,
         eval: Eval<S>,
@@ -275,8 +323,9 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     ) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
-        let fine = pdf > S::zero() && weight.iter().all(|w| w.is_finite());
-        let (eta, roughness) = (S::one() / lobe.lobe.relative_eta(local), lobe.lobe.roughness());
+        // f and pdf are finite.
+        let fine = pdf > S::zero() && weight[0].max(weight[1]).max(weight[2]).is_finite();
+        let (eta, roughness) = lobe.lobe.crossing(local);
         fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta, roughness })
     }
 
@@ -462,13 +511,7 @@ impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
 
 /// Adds f·|cos| per channel and the pdf of one lobe, scaled by what lies above it.
 #[inline(always)]
-pub(super) fn add<S: Scalar, L: Over<S>>(
-    sum: &mut [L; 4],
-    l: &FlatLobe<'_, S>,
-    scale: Rgb<L>,
-    cos: L,
-    e: &Evaluated<L>,
-) {
+pub(super) fn add<S: Real, L: Over<S>>(sum: &mut [L; 4], l: &FlatLobe<'_, S>, scale: Rgb<L>, cos: L, e: &Evaluated<L>) {
     let cos = cos.abs().min(L::one());
     let values = [e.f[0], e.f[1], e.f[2], e.pdf];
     let scales = [scale[0] * cos, scale[1] * cos, scale[2] * cos, L::one()];
@@ -478,19 +521,28 @@ pub(super) fn add<S: Scalar, L: Over<S>>(
     }
 }
 
-impl<S: Scalar> FlatLobe<'_, S> {
+impl<S: Real> FlatLobe<'_, S> {
     /// Estimates what it scatters toward ωo, `wo` in its frame, where the layers above scale it by `scale`; `share` holds its
-    /// weight. Returns the bound there, if it stands in a top: under `view` on that side alone.
+    /// weight. The albedo and its bound there come along. Returns the bound, if it stands in a top – under `view` on that side
+    /// alone –, and what its probability is in proportion to.
     #[inline(always)]
-    pub(super) fn weigh(&mut self, wo: V3<S>, scale: Rgb<S>) -> Rgb<S> {
-        let [albedo, bound] = self.lobe.albedos(wo, self.curve, self.in_top);
+    pub(super) fn weigh(&mut self, wo: V3<S>, scale: Rgb<S>, [albedo, bound]: [Rgb<S>; 2]) -> (Rgb<S>, S) {
         self.albedo = rgb!(c => self.share[c] * scale[c] * albedo[c]);
         let largest = self.albedo[0].max(self.albedo[1]).max(self.albedo[2]).max(S::zero());
         // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
-        self.share[3] = largest.min(S::c(1e30));
-        if self.inside && !self.in_top { self.lobe.view_bound(wo, self.curve) } else { bound }
+        let part = largest.min(S::c(1e30));
+        self.share[3] = part;
+        if self.inside && !self.in_top {
+            // As numbers: what comes from a call stays in memory.
+            let [r, g, b] = self.lobe.view_bound(wo.apart(), self.curve);
+            ([r, g, b], part)
+        } else {
+            (bound, part)
+        }
     }
+}
 
+impl<S: Scalar> FlatLobe<'_, S> {
     /// The bound at a direction, if it is asked for.
     pub(super) fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
         if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }

@@ -206,9 +206,8 @@ pub fn flatten_into<'m, S: Scalar>(
     bsdf: &mut Bsdf<'m, S>,
 ) -> Result<(), TreeError> {
     let layers = tree.size(tree.root()).layers;
-    let zero = V3::new(S::zero(), S::zero(), S::zero());
-    let ng = frame::normalize(V3::from_f32(globals.ng.to_array()));
-    bsdf.reset(frame::normalize(wo).unwrap_or(zero), ng.unwrap_or(zero), layering, layers);
+    bsdf.reset(frame::normalize_or_zero(wo), V3::from_f32(globals.ng.to_array()), layering, layers);
+    bsdf.filled = true;
     tree.within_budget()?;
     let tables = tables.into();
     match layers {
@@ -416,14 +415,20 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         });
         let Some(l) = self.bsdf.lobes.last_mut() else { return };
         // Made where it stays, because there is room for the largest.
-        if !known.is_some_and(|k| k.turn(wo, curve, &mut l.lobe)) {
+        let in_top = l.in_top;
+        let albedos = known.and_then(|k| k.turn(wo, curve, in_top, &mut l.lobe));
+        if albedos.is_none() {
             l.lobe = AnyLobe::new(kind, values, wo, curve);
         }
         if class == LobeClass::Emission {
             self.emission(w, scale);
             return;
         }
-        let bound = l.weigh(wo, scale);
+        let albedos = match albedos {
+            Some(albedos) => albedos,
+            None => l.lobe.albedos(wo, curve, in_top),
+        };
+        let (bound, _) = l.weigh(wo, scale, albedos);
         if w.inside {
             self.stack.lobe(first(w.in_top), bound);
         }

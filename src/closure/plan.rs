@@ -8,9 +8,11 @@
 use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
 use super::flatten::{Curves, Layering};
 use super::layer::{FlatStack, LayeringRule, TintRule, step};
+use super::sites::Site;
+use crate::albedo::AlbedoCurve;
 use crate::globals::Globals;
 use crate::lobes::{AnyLobe, LobeKind, Rgb};
-use crate::optics::{Frame, Scalar, V3, frame};
+use crate::optics::{F32x8, Frame, Over, Scalar, V3, frame, lifted};
 use glam::Vec3;
 
 /// Where a direction comes from.
@@ -53,6 +55,24 @@ pub struct Axes {
     pub tangent: Direction,
     /// Whether N is turned to the outside: see [`LobeKind::between_media`].
     pub between_media: bool,
+}
+
+impl Axes {
+    #[inline(always)]
+    fn at<S: Scalar>(&self, globals: &Globals) -> Frame<S> {
+        // As most are: without asking for each.
+        let usual =
+            matches!(self, Axes { normal: Direction::Normal, tangent: Direction::AlongU, between_media: false });
+        let (n, t) = if usual { (globals.n, globals.dpdu) } else { self.given(globals) };
+        Frame::new(vector(n), vector(globals.ng), vector(t), vector(globals.dpdu))
+    }
+
+    /// Normal and tangent, as the tree gives them.
+    #[inline(always)]
+    fn given(&self, globals: &Globals) -> (Vec3, Vec3) {
+        let n = self.normal.at(globals);
+        (if globals.backfacing && self.between_media { -n } else { n }, self.tangent.at(globals))
+    }
 }
 
 /// See the module.
@@ -112,23 +132,45 @@ impl<S: Scalar> Plan<S> {
     }
 
     /// The BSDF at a point, seen from `wo` (world space, any length), into memory that is used again.
+    #[inline(always)]
     pub(crate) fn turn<'m>(&'m self, globals: &Globals, wo: V3<S>, curves: &'m Curves<S>, bsdf: &mut Bsdf<'m, S>) {
-        let zero = V3::new(S::zero(), S::zero(), S::zero());
-        let vector = |v: Vec3| V3::from_f32(v.to_array());
-        let wo = frame::normalize(wo).unwrap_or(zero);
-        let ng = frame::normalize(vector(globals.ng)).unwrap_or(zero);
-        bsdf.reset(wo, ng, self.layering, self.depth);
+        // In registers: three numbers a caller has just put down one by one cannot be picked up as two.
+        self.turn_toward(globals, wo.x, wo.y, wo.z, curves, bsdf);
+    }
+
+    fn turn_toward<'m>(&'m self, globals: &Globals, x: S, y: S, z: S, curves: &'m Curves<S>, bsdf: &mut Bsdf<'m, S>) {
+        let wo = frame::normalize_or_zero(V3::new(x, y, z));
+        bsdf.reset(wo, vector(globals.ng), self.layering, self.depth);
+        // The first frame's is at hand: what has just been stored in parts would have to be waited for.
+        let local = match self.frames.split_first() {
+            Some((first, more)) => {
+                let first = first.at(globals);
+                bsdf.frames.push(first);
+                for axes in more {
+                    bsdf.frames.push(axes.at(globals));
+                }
+                first.to_local(wo)
+            }
+            None => wo,
+        };
+        self.fill::<S, Turned>(local, wo, curves, bsdf);
+    }
+
+    /// The lobes, in a BSDF that has its frames; `local` is `wo` in the first of them.
+    #[inline(always)]
+    fn fill<'m, L: Over<S>, P: Prepare<S, L>>(
+        &'m self,
+        mut local: V3<L>,
+        wo: V3<L>,
+        curves: &'m Curves<S>,
+        bsdf: &mut Bsdf<'m, L>,
+    ) {
         bsdf.planned_ops = &self.ops;
-        for axes in &self.frames {
-            let n = axes.normal.at(globals);
-            let n = if globals.backfacing && axes.between_media { -n } else { n };
-            let t = axes.tangent.at(globals);
-            bsdf.frames.push(Frame::new(vector(n), vector(globals.ng), vector(t), vector(globals.dpdu)));
-        }
         let view = self.layering.rule == LayeringRule::View;
         let mut layers = self.layers.iter();
-        let mut stack = FlatStack::<S>::default();
-        let (mut frame, mut local, mut alpha_o) = (u32::MAX, wo, S::one());
+        let mut stack = FlatStack::<L>::default();
+        let mut frame = 0;
+        let (mut alpha_o, mut total) = (L::one(), L::zero());
         for p in &self.lobes {
             if p.frame != frame {
                 frame = p.frame;
@@ -138,36 +180,114 @@ impl<S: Scalar> Plan<S> {
                 && let Some(weight) = layers.next()
             {
                 alpha_o = stack.alpha();
-                bsdf.layers.push(LayerAlpha { alpha_o: [alpha_o; 3], weight: *weight });
+                bsdf.layers.push(LayerAlpha { alpha_o: [alpha_o; 3], weight: lifted(*weight) });
             }
             let scale = stack.step(p.steps, self.layering.rule, alpha_o);
             let (curve, site) = curves.at(p.site);
+            let in_top = p.inside && !view;
             bsdf.lobes.push(FlatLobe {
-                share: p.weight,
+                share: lifted(p.weight),
                 lobe: AnyLobe::nothing(),
                 curve,
                 site: p.site,
                 frame,
-                weight_in_top: p.weight_in_top,
+                weight_in_top: lifted(p.weight_in_top),
                 alpha_o,
                 steps: p.steps,
                 inside: p.inside,
-                in_top: p.inside && !view,
+                in_top,
                 delta: p.delta,
-                albedo: [S::zero(); 3],
+                albedo: [L::zero(); 3],
             });
             let (Some(l), Some(site)) = (bsdf.lobes.last_mut(), site) else { return };
             // Made where it stays, because there is room for the largest.
-            if !site.turn(local, curve, &mut l.lobe) {
-                l.lobe = AnyLobe::new(p.kind, site.values(), local, curve);
-            }
-            let bound = l.weigh(local, [scale; 3]);
+            let albedos = P::prepare(p.kind, site, local, curve, in_top, &mut l.lobe);
+            let (bound, part) = l.weigh(local, [scale; 3], albedos);
             if p.inside {
                 stack.lobe(p.weight_in_top, bound);
             }
+            total += part;
         }
-        bsdf.finish();
+        bsdf.share_out(total);
     }
+}
+
+impl Plan<f32> {
+    /// [`turn`](Self::turn) at eight points: the bits of each.
+    pub(crate) fn turn_eight<'m>(
+        &'m self,
+        points: [&Globals; 8],
+        wo: [[f32; 3]; 8],
+        curves: &'m Curves<f32>,
+        bsdf: &mut Bsdf<'m, F32x8>,
+    ) {
+        let packed = |each: [V3<f32>; 8]| V3::new(each.map(|v| v.x), each.map(|v| v.y), each.map(|v| v.z)).map(F32x8);
+        let wo = packed(wo.map(|[x, y, z]| frame::normalize_or_zero(V3::new(x, y, z))));
+        bsdf.reset(wo, packed(points.map(|globals| vector(globals.ng))), self.layering, self.depth);
+        for axes in &self.frames {
+            let each = points.map(|globals| axes.at::<f32>(globals));
+            let frame =
+                Frame { t: packed(each.map(|f| f.t)), b: packed(each.map(|f| f.b)), n: packed(each.map(|f| f.n)) };
+            bsdf.frames.push(frame);
+        }
+        let local = bsdf.frames.first().map_or(wo, |frame| frame.to_local(wo));
+        self.fill::<F32x8, Made>(local, wo, curves, bsdf);
+    }
+}
+
+/// How a lobe of known parameters is prepared for ωo. Gives what [`AnyLobe::albedos`] would.
+trait Prepare<S: Scalar, L: Over<S>> {
+    fn prepare(
+        kind: LobeKind,
+        site: &Site<S>,
+        wo: V3<L>,
+        curve: &AlbedoCurve<S>,
+        bound: bool,
+        to: &mut AnyLobe<L>,
+    ) -> [Rgb<L>; 2];
+}
+
+/// From its parameters.
+struct Made;
+
+impl<S: Scalar, L: Over<S>> Prepare<S, L> for Made {
+    #[inline(always)]
+    fn prepare(
+        kind: LobeKind,
+        site: &Site<S>,
+        wo: V3<L>,
+        curve: &AlbedoCurve<S>,
+        bound: bool,
+        to: &mut AnyLobe<L>,
+    ) -> [Rgb<L>; 2] {
+        *to = AnyLobe::new(kind, site.values(), wo.apart(), curve);
+        to.albedos(wo, curve, bound)
+    }
+}
+
+/// Turned from what was prepared before, where there is such a way.
+struct Turned;
+
+impl<S: Scalar> Prepare<S, S> for Turned {
+    #[inline(always)]
+    fn prepare(
+        kind: LobeKind,
+        site: &Site<S>,
+        wo: V3<S>,
+        curve: &AlbedoCurve<S>,
+        bound: bool,
+        to: &mut AnyLobe<S>,
+    ) -> [Rgb<S>; 2] {
+        match site.turn(wo, curve, bound, to) {
+            Some(albedos) => albedos,
+            None => Made::prepare(kind, site, wo, curve, bound, to),
+        }
+    }
+}
+
+#[inline(always)]
+fn vector<S: Scalar>(v: Vec3) -> V3<S> {
+    V3::from_f32(v.to_array())
 }
 
 /// Whether a layering is one that plans are for.

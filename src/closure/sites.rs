@@ -6,7 +6,7 @@
 use super::walk::Stand;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::registry::{LobeClass, ParamTy};
-use crate::lobes::{AnyLobe, LobeKind, Rgb32};
+use crate::lobes::{AnyLobe, LobeKind, Rgb, Rgb32};
 use crate::optics::{Scalar, V3};
 
 /// A lobe whose parameters, but for directions, are known.
@@ -63,10 +63,11 @@ impl<S: Scalar> Site<S> {
         &self.values
     }
 
-    /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters.
+    /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters. Gives what
+    /// [`AnyLobe::albedos`] would.
     #[inline(always)]
-    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, to: &mut AnyLobe<S>) -> bool {
-        self.lobe.turn(wo, curve, to)
+    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, bound: bool, to: &mut AnyLobe<S>) -> Option<[Rgb<S>; 2]> {
+        self.lobe.turn(wo, curve, bound, to)
     }
 }
 
@@ -107,11 +108,10 @@ mod tests {
             for cos in [0.9f32, 0.3, 1e-3, -0.2] {
                 let wo = V3::polar(cos, 0.7);
                 let mut lobe = AnyLobe::nothing();
-                if !site.turn(wo, &curve, &mut lobe) {
-                    continue;
-                }
+                let Some(albedos) = site.turn(wo, &curve, true, &mut lobe) else { continue };
                 turned += 1;
                 let made = AnyLobe::new(kind, &values, wo, &curve);
+                assert_eq!(albedos, made.albedos(wo, &curve, true), "{kind:?} {values:?} {cos}");
                 for wi in [V3::polar(0.8, 2.0), V3::polar(0.05, -1.0), V3::polar(-0.4, 0.3)] {
                     let [a, b] = [&lobe, &made].map(|l| l.evaluate(wi, &curve, true));
                     assert_eq!((a.f, a.pdf, a.bound), (b.f, b.pdf, b.bound), "{kind:?} {values:?} {cos} {wi:?}");

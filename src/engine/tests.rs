@@ -50,3 +50,37 @@ fn nothing_is_left_of_the_point_before() {
         assert_eq!((bsdf.emission(), bsdf.lobe_count()), (alone.emission(), alone.lobe_count()));
     }
 }
+
+#[test]
+fn many_points_give_what_each_gives_alone() {
+    let scripts = [
+        "Ci = sheen(0.7 * diffuse(N), N, color(0.3, 0.4, 0.5), 0.4);",
+        "Ci = sheen(0.7 * diffuse(N), N, color(0.3, 0.4, 0.5), 0.1 + 0.8 * u);",
+        "Ci = emission() + diffuse(N);",
+        "Ci = 0;",
+    ];
+    let wo: Vec<[f32; 3]> =
+        (0..21).map(|k| V3::polar(1.0 - k as f32 * 0.06, k as f32)).map(|w| [w.x, w.y, w.z]).collect();
+    let points: Vec<Globals> = (0..21).map(|k| Globals { u: k as f32 / 21.0, ..Globals::default() }).collect();
+    let materials = scripts.map(|script| Engine::new().material("m", script).expect(script));
+    let mut bsdfs = Bsdfs::new();
+    for (material, script) in materials.iter().zip(scripts) {
+        // Fewer than before, more than before, fewer directions than points.
+        for count in [13, 21, 0] {
+            material.shade_many(&points[..count], &wo, &mut bsdfs).expect("small");
+            assert_eq!((bsdfs.len(), bsdfs.is_empty()), (count, count == 0));
+            let mut out = vec![Eval { f_cos: [-1.0; 3], pdf: -1.0 }; 21];
+            bsdfs.eval(&wo[..count], &mut out);
+            for k in 0..21 {
+                let alone = material.shade(&points[k], wo[k].into()).expect("small").eval(wo[k]);
+                let expected = if k < count { alone } else { Eval { f_cos: [-1.0; 3], pdf: -1.0 } };
+                assert_eq!(out[k], expected, "{script} at {k} of {count}");
+            }
+        }
+    }
+    let deep = "Ci = diffuse(N); for (int i = 0; i < 4000 * u; i++) Ci = layer(0.1 * sheen(N, 0.3), Ci);";
+    let deep = Engine::new().material("m", deep).expect(deep);
+    let mut bsdfs = Bsdfs::new();
+    assert!(deep.shade_many(&points[..1], &wo, &mut bsdfs).is_ok() && bsdfs.len() == 1);
+    assert!(deep.shade_many(&points, &wo, &mut bsdfs).is_err() && bsdfs.is_empty());
+}

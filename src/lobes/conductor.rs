@@ -10,7 +10,7 @@
 
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, metal_reflectance, widths};
-use super::{Lobe, Rgb};
+use super::{Evaluated, Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::film::Film;
@@ -94,6 +94,11 @@ impl<S: Real> Lobe<S> for Conductor<S> {
     #[inline(always)]
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.surface.pdf(wi)
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        self.surface.evaluate(wi, curve.facets(), bound)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {

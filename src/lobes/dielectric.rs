@@ -16,7 +16,7 @@ use super::interface::{Interface, index};
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
-use super::{Lobe, Rgb, Sides};
+use super::{Evaluated, Lobe, Rgb, Sides, apart};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3};
@@ -124,6 +124,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
+    #[inline(always)]
     fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
         match self {
             Solid(surface) => Some(Solid(surface.toward(wo, curve.facets()))),
@@ -154,6 +155,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
+    #[inline(always)]
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
             Solid(surface) => surface.albedo(w, curve.facets()),
@@ -166,6 +168,14 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         match self {
             Solid(surface) => surface.albedo_bound(w, curve.facets()),
             Thin(surface) => surface.albedo_bound(w, curve.facets()),
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        match self {
+            Solid(surface) => surface.evaluate(wi, curve.facets(), bound),
+            Thin(_) => apart(self, wi, curve, bound),
         }
     }
 

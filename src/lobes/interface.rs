@@ -19,7 +19,7 @@
 //! Shadowing is 1/(1 + Λo + Λi) for both, as renderers do; the exact form for refraction is a Beta function.
 
 use super::rough::{Reflectance, chance, even, largest, split};
-use super::{Rgb, Sides};
+use super::{Evaluated, Rgb, Sides};
 use crate::albedo::facets::{FacetTables, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
@@ -65,6 +65,35 @@ pub struct Interface<S> {
     /// Largest channels of the tints.
     odds: [S; 2],
     sides: Sides,
+    /// Of ωo outside, and inside.
+    media: [Medium<S>; 2],
+}
+
+/// What depends on the side that ωo is on alone.
+#[derive(Clone, Copy, Debug)]
+struct Medium<S> {
+    /// 1 − x here.
+    crossing: S,
+    /// `again` over M(ωo)/π.
+    again: [S; 2],
+    /// Of even directions, the share that crosses.
+    across: S,
+    /// 1 if there are even directions, else 0.
+    any: S,
+}
+
+impl<S: Real> Medium<S> {
+    /// 1 − x, M̄ on this side and on the far one.
+    fn new(crossing: S, near: S, far: S, odds: [S; 2]) -> Self {
+        let tiny = S::c(1e-30);
+        let [back, on] = [(S::one() - crossing) * odds[0], crossing * odds[1]];
+        Medium {
+            crossing,
+            again: [(S::one() - crossing) / near.max(tiny), crossing / far.max(tiny)],
+            across: on / (back + on).max(tiny),
+            any: S::select((back + on).gt(S::zero()), S::one(), S::zero()),
+        }
+    }
 }
 
 impl<S: Real> Interface<S> {
@@ -81,6 +110,12 @@ impl<S: Real> Interface<S> {
         let sides = Sides::tinted(tints);
         let [reflected, refracted] = tints.map(|t| t.map(S::from_f32));
         let odds = [largest(reflected), largest(refracted)];
+        let (up, down) = (tables.mean_missing(false, facets.alpha()), tables.mean_missing(true, facets.alpha()));
+        let inside_flux = S::c(eta * eta) * down;
+        let shared = S::c(4.0 * eta / ((1.0 + eta) * (1.0 + eta))) * up.min(inside_flux);
+        let tiny = S::c(1e-30);
+        let outside = Medium::new(shared / up.max(tiny), up, down, odds);
+        let inside = Medium::new(shared / inside_flux.max(tiny), down, up, odds);
         let (zero, none) = (S::zero(), [S::zero(); 2]);
         Interface {
             wo,
@@ -99,37 +134,31 @@ impl<S: Real> Interface<S> {
             across: zero,
             odds,
             sides,
+            media: [outside, inside],
         }
         .toward(wo, tables)
     }
 
     /// The same surface seen from another ωo.
-    pub(super) fn toward(self, wo: V3<S>, tables: &FacetTables<S::Entry>) -> Self {
-        let Interface { facets, eta, odds, .. } = self;
+    #[inline(always)]
+    pub(super) fn toward(&self, wo: V3<S>, tables: &FacetTables<S::Entry>) -> Self {
+        let Interface { facets, eta, media: [up, down], .. } = *self;
         let outside = wo.z.gt(S::zero());
-        // Both are computed, because a Real cannot branch.
+        // Both are at hand, because a Real cannot branch.
         let pick = |a: S, b: S| S::select(outside, a, b);
-        let (up, down) = (tables.mean_missing(false, facets.alpha()), tables.mean_missing(true, facets.alpha()));
-        let (near, far) = (pick(up, down), pick(down, up));
-        let inside_flux = S::c(eta * eta) * down;
-        let shared = S::c(4.0 * eta / ((1.0 + eta) * (1.0 + eta))) * up.min(inside_flux);
-        let tiny = S::c(1e-30);
-        let (cross_up, cross_down) = (shared / up.max(tiny), shared / inside_flux.max(tiny));
-        let crossing = [pick(cross_up, cross_down), pick(cross_down, cross_up)];
         let missing = tables.missing(wo, facets.alpha()) * S::c(FRAC_1_PI);
-        let [back, on] = [(S::one() - crossing[0]) * odds[0], crossing[0] * odds[1]];
-        let even = S::c(1.0 / FRAC_1_PI) * missing * S::select((back + on).gt(S::zero()), S::one(), S::zero());
+        let reach = facets.reach(wo);
         Interface {
             wo,
             far: pick(S::c(eta), S::c(1.0 / eta)),
             side: pick(S::one(), -S::one()),
-            reach: facets.reach(wo),
-            proposal: facets.proposal().reach(wo),
-            again: [missing * (S::one() - crossing[0]) / near.max(tiny), missing * crossing[0] / far.max(tiny)],
-            crossing,
-            even,
-            across: on / (back + on).max(tiny),
-            ..self
+            reach,
+            proposal: if facets.is_proposal() { reach } else { facets.proposal().reach(wo) },
+            again: [missing * pick(up.again[0], down.again[0]), missing * pick(up.again[1], down.again[1])],
+            crossing: [pick(up.crossing, down.crossing), pick(down.crossing, up.crossing)],
+            even: S::c(1.0 / FRAC_1_PI) * missing * pick(up.any, down.any),
+            across: pick(up.across, down.across),
+            ..*self
         }
     }
 
@@ -227,6 +256,7 @@ impl<S: Real> Interface<S> {
     }
 
     /// [`Self::reflectance`] of a facet that ωo meets at the cosine `c`, all channels alike.
+    #[inline(always)]
     fn grey(&self, c: S) -> S {
         let g2 = c.mul_add(c, (self.far - S::one()) * (self.far + S::one()));
         let Some(law) = &self.colored else {
@@ -249,50 +279,65 @@ impl<S: Real> Interface<S> {
 
     #[inline(always)]
     pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
-        self.value(wi, tables.missing(wi, self.facets.alpha()))
+        self.scattered(wi, tables.missing(wi, self.facets.alpha())).0
     }
 
-    /// f where `missing` is what the tables say at ωi.
     #[inline(always)]
-    fn value<L: Over<S>>(&self, wi: V3<L>, missing: L) -> Rgb<L> {
+    pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
+        self.scattered(wi, L::zero()).1
+    }
+
+    /// All at once.
+    #[inline(always)]
+    pub(super) fn evaluate<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>, bound: bool) -> Evaluated<L> {
+        let missing = tables.missing(wi, self.facets.alpha());
+        let (f, pdf) = self.scattered(wi, missing);
+        let bound = if bound { self.bound(wi, missing, tables) } else { [L::zero(); 3] };
+        Evaluated { f, pdf, bound }
+    }
+
+    /// f, where `missing` is what the tables say at ωi, and the density. A side that has no tint, or that no lane looks to, is
+    /// left out.
+    #[inline(always)]
+    fn scattered<L: Over<S>>(&self, wi: V3<L>, missing: L) -> (Rgb<L>, L) {
         let wo = V3::<L>::lift(self.wo);
         let (same, other) = self.sides(wi);
-        let shadowed = wi.z.abs().mul_add(L::lift(self.reach), wo.z.abs() * self.facets.reach(wi)).max(L::c(1e-18));
-        let h = wo + wi;
-        let mirrored = self.facets.d(h) * L::c(0.5) / shadowed;
-        let reflectance = self.reflectance(wi);
-        let (h, jacobian, passed) = self.refraction(wi);
-        let bent = jacobian * self.facets.d(h) * L::c(2.0) / shadowed;
+        let (cos_o, proposal, even, across) =
+            (wo.z.abs(), L::lift(self.proposal), L::lift(self.even), L::lift(self.across));
+        let shadowed = wi.z.abs().mul_add(L::lift(self.reach), cos_o * self.facets.reach(wi)).max(L::c(1e-18));
+        let flat = even * sampling::cosine_hemisphere_pdf(wi.z.abs());
         let [back_again, on_again] = array(|k| L::lift(self.again[k]) * missing);
-        rgb!(c => {
-            let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);
-            let on = L::lift(self.refracted[c]) * passed[c].mul_add(bent, on_again);
-            L::select(same, back, L::select(other, on, L::zero()))
-        })
+        let (mut f, mut pdf) = ([L::zero(); 3], L::zero());
+        if self.sides.reflect && L::any(same) {
+            let h = wo + wi;
+            let reflectance = self.reflectance(wi);
+            let (d, density) = self.facets.d_and_mirrored_pdf(h, cos_o, proposal);
+            let mirrored = d * L::c(0.5) / shadowed;
+            let back = self.chance(mean(reflectance)) * density;
+            f = rgb!(c => {
+                let back = L::lift(self.reflected[c]) * reflectance[c].mul_add(mirrored, back_again);
+                L::select(same, back, L::zero())
+            });
+            pdf = L::select(same, (L::one() - even).mul_add(back, flat * (L::one() - across)), L::zero());
+        }
+        if self.sides.transmit && L::any(other) {
+            let (h, jacobian, passed) = self.refraction(wi);
+            let (d, density) = self.facets.d_and_mirrored_pdf(h, cos_o, proposal);
+            let bent = jacobian * d * L::c(2.0) / shadowed;
+            let on = (L::one() - self.chance(L::one() - mean(passed))) * (L::c(4.0) * jacobian * density);
+            f = rgb!(c => {
+                let on = L::lift(self.refracted[c]) * passed[c].mul_add(bent, on_again);
+                L::select(other, on, f[c])
+            });
+            pdf = L::select(other, (L::one() - even).mul_add(on, flat * across), pdf);
+        }
+        (f, pdf)
     }
 
     /// Probability of reflecting at a facet with reflectance `f`.
     #[inline(always)]
     fn chance<L: Over<S>>(&self, f: L) -> L {
         chance(f, lifted(self.odds))
-    }
-
-    #[inline(always)]
-    pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
-        let wo = V3::<L>::lift(self.wo);
-        let (same, other) = self.sides(wi);
-        let (cos_o, proposal) = (wo.z.abs(), L::lift(self.proposal));
-        let h = wo + wi;
-        let back = self.chance(mean(self.reflectance(wi))) * self.facets.mirrored_pdf(h, cos_o, proposal);
-        let (h, jacobian, passed) = self.refraction(wi);
-        let density = L::c(4.0) * jacobian * self.facets.mirrored_pdf(h, cos_o, proposal);
-        let on = (L::one() - self.chance(L::one() - mean(passed))) * density;
-        let even = L::lift(self.even);
-        let flat = even * sampling::cosine_hemisphere_pdf(wi.z.abs());
-        let across = L::lift(self.across);
-        let back = (L::one() - even).mul_add(back, flat * (L::one() - across));
-        let on = (L::one() - even).mul_add(on, flat * across);
-        L::select(same, back, L::select(other, on, L::zero()))
     }
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
@@ -331,6 +376,7 @@ impl<S: Real> Interface<S> {
     }
 
     /// Best estimate of the albedo.
+    #[inline(always)]
     pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S::Entry>) -> Rgb<S> {
         let missing = tables.missing(w, self.facets.alpha());
         if tables.has_parts() {
@@ -344,7 +390,11 @@ impl<S: Real> Interface<S> {
     /// Never below the albedo, from either side.
     #[inline(always)]
     pub(super) fn albedo_bound<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
-        let missing = tables.missing(w, self.facets.alpha());
+        self.bound(w, tables.missing(w, self.facets.alpha()), tables)
+    }
+
+    #[inline(always)]
+    fn bound<L: Over<S>>(&self, w: V3<L>, missing: L, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         if tables.has_parts() {
             return self.total(w, missing, self.sorted(tables.bound(w)));
         }

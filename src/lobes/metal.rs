@@ -8,7 +8,7 @@
 use super::conductor::{Conductor, ConductorParams};
 use super::registry::{ClosureParams, closure};
 use super::rough::widths;
-use super::{Lobe, Rgb};
+use super::{Evaluated, Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3, fresnel};
 
@@ -101,6 +101,11 @@ impl<S: Real> Lobe<S> for Metal<S> {
     #[inline(always)]
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         self.metal.pdf(wi)
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        self.metal.evaluate(wi, curve, bound)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {

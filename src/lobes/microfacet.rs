@@ -15,7 +15,7 @@
 use super::interface::{Interface, index};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
-use super::{Lobe, Rgb, Sides};
+use super::{Evaluated, Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3};
@@ -147,6 +147,14 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
         match self {
             Mirror(surface) => surface.albedo_bound(w, curve.facets()),
             Glass(surface) => surface.albedo_bound(w, curve.facets()),
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        match self {
+            Mirror(surface) => surface.evaluate(wi, curve.facets(), bound),
+            Glass(surface) => surface.evaluate(wi, curve.facets(), bound),
         }
     }
 

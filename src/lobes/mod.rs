@@ -36,6 +36,7 @@ pub mod host;
 #[cfg(feature = "microfacet")]
 mod interface;
 pub mod limits;
+mod lobe;
 mod ltc_tables;
 #[cfg(feature = "microfacet")]
 pub mod metal;
@@ -74,6 +75,8 @@ pub mod ward;
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Over, Real, V3};
 use limits::{Limits, SlotRange};
+pub use lobe::{Evaluated, Lobe, Sides};
+use lobe::{albedos, apart};
 use registry::{ClosureParams, LobeClass, LobeSpec};
 pub use signatures::forms;
 
@@ -82,191 +85,33 @@ pub type Rgb<R> = [R; 3];
 /// A colour as scripts hold it: linear RGB.
 pub type Rgb32 = [f32; 3];
 
-/// To which sides of its own surface a prepared lobe may scatter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sides {
-    /// Back to the side ωo is on.
-    pub reflect: bool,
-    /// To the other side.
-    pub transmit: bool,
-}
-
-impl Sides {
-    /// Back to the side ωo is on.
-    pub const REFLECT: Sides = Sides { reflect: true, transmit: false };
-    /// To the other side.
-    pub const TRANSMIT: Sides = Sides { reflect: false, transmit: true };
-    /// Both.
-    pub const BOTH: Sides = Sides { reflect: true, transmit: true };
-
-    /// Those of what is reflected and of what is transmitted that has a tint.
-    #[cfg(feature = "microfacet")]
-    fn tinted(tints: [Rgb32; 2]) -> Sides {
-        let [reflect, transmit] = tints.map(|t| t.iter().any(|x| *x > 0.0));
-        Sides { reflect, transmit }
-    }
-}
-
-/// One model of scattering, prepared for one ωo.
-///
-/// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
-/// type parameter is what the lobe was prepared in; `f`, `pdf` and `albedo_bound` may be evaluated over lanes.
-pub trait Lobe<S: Real>: Sized + Copy {
-    /// The declared parameters.
-    type Params: ClosureParams;
-
-    /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
-    fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
-        let _ = values;
-        None
-    }
-
-    /// The table of whatever shape a parameter block needs: the [`curve`](Lobe::curve), unless a lobe says otherwise.
-    fn table(values: &[Option<f32>]) -> Option<TableSpec> {
-        Self::curve(values).map(TableSpec::Cosine)
-    }
-
-    /// A color that multiplies the lobe and stays out of its albedo curve.
-    fn weight(params: &Self::Params) -> Rgb32 {
-        let _ = params;
-        [1.0; 3]
-    }
-
-    /// Whether this instance is reciprocal.
-    fn reciprocal(params: &Self::Params) -> bool {
-        let _ = params;
-        Self::Params::SPEC.reciprocal
-    }
-
-    /// Whether f of this instance depends on where the tangent points.
-    fn follows_tangent(params: &Self::Params) -> bool {
-        let _ = params;
-        Self::Params::SPEC.tangent_slot().is_some()
-    }
-
-    /// Whether it lies between two media: z points to the outside, also where the host turned N toward a viewer inside.
-    fn between_media(params: &Self::Params) -> bool {
-        let _ = params;
-        false
-    }
-
-    /// The index of refraction on ωo's side over that on ωi's; 1 unless light crosses into another medium. The adjoint
-    /// of f is f times its square.
-    #[inline(always)]
-    fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
-        let _ = wi;
-        L::one()
-    }
-
-    /// Prepares everything that depends on the parameters and on ωo alone.
-    fn new(params: &Self::Params, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self;
-
-    /// The same lobe for another ωo: the bits that [`new`](Lobe::new) gives for the same parameters. `None` if there is no
-    /// shorter way.
-    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
-        let _ = (wo, curve);
-        None
-    }
-
-    /// f(ωo, ωi), without any cosine. Zero on sides the lobe does not scatter to. Finite for every input.
-    fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L>;
-
-    /// All that evaluating a BSDF asks at once: [`f`](Lobe::f), [`pdf`](Lobe::pdf) and, if it is asked for, the
-    /// [`albedo_bound`](Lobe::albedo_bound), the same bits.
-    #[inline(always)]
-    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
-        let bound = if bound { self.albedo_bound(wi, curve) } else { [L::zero(); 3] };
-        Evaluated { f: self.f(wi, curve), pdf: self.pdf(wi), bound }
-    }
-
-    /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
-    fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L;
-
-    /// A direction for two uniform numbers in [0, 1); one in the horizon, z = 0, says that there is none for these.
-    fn sample(&self, u: [S; 2]) -> V3<S>;
-
-    /// Best estimate of E_view(ω) = ∫ f(ω, ωi)·|cos θi| dωi.
-    fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S>;
-
-    /// Never below E_view(ω) nor E_light(ω), on ω's own side of the surface.
-    fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L>;
-
-    /// Never below E_view(ω), on ω's own side: [`albedo_bound`](Lobe::albedo_bound), unless a lobe that is not
-    /// reciprocal has a tighter one.
-    fn view_bound(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
-        self.albedo_bound(w, curve)
-    }
-
-    /// How small and how large the albedo may be over whole ranges of parameters, `(lowest, highest)` per slot as given
-    /// (not yet clamped), and of cosines to the lobe's normal. `None`: to be read off the table.
-    fn limits(ranges: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
-        let _ = (ranges, cos);
-        None
-    }
-
-    /// The first slot of a color that the albedo is at most proportional to: the lobe's [`weight`](Lobe::weight), or a
-    /// reflectance that bounds it. [`limits`](Lobe::limits) leaves it out.
-    fn tint_slot() -> Option<usize> {
-        None
-    }
-
-    /// To which sides this instance may scatter.
-    fn sides(&self) -> Sides {
-        Sides::REFLECT
-    }
-
-    /// How wide this instance scatters: 0 one direction, 1 as wide as a diffuse surface. Perceptual, as users set it.
-    fn roughness(&self) -> S {
-        S::one()
-    }
-
-    /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
-    fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
-        None
-    }
-}
-
-/// All that an evaluation asks of a lobe for one direction, or for several side by side.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub struct Evaluated<L> {
-    /// See [`Lobe::f`].
-    pub f: Rgb<L>,
-    /// See [`Lobe::pdf`].
-    pub pdf: L,
-    /// See [`Lobe::albedo_bound`]; 0 if it was not asked for.
-    pub bound: Rgb<L>,
-}
-
 /// See [`AnyLobe::turn`].
 #[inline(always)]
 fn turned<S: Real, T: Lobe<S>>(
     lobe: &T,
     wo: V3<S>,
     curve: &AlbedoCurve<S::Entry>,
+    bound: bool,
     to: &mut AnyLobe<S>,
     any: impl Fn(T) -> AnyLobe<S>,
-) -> bool {
-    match lobe.toward(wo, curve) {
-        Some(turned) => {
-            *to = any(turned);
-            true
-        }
-        None => false,
-    }
-}
-
-#[inline(always)]
-fn albedos<S: Real>(lobe: &impl Lobe<S>, w: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> [Rgb<S>; 2] {
-    [lobe.albedo(w, curve), if bound { lobe.albedo_bound(w, curve) } else { [S::zero(); 3] }]
+) -> Option<[Rgb<S>; 2]> {
+    let (turned, albedos) = lobe.seen(wo, curve, bound)?;
+    *to = any(turned);
+    Some(albedos)
 }
 
 /// Something to do with a lobe whose type is known.
 pub(crate) trait LobeVisitor<S: Real> {
     /// A lobe of the list.
-    fn scattering(self, lobe: &impl Lobe<S>);
+    fn scattering<B: Lobe<S> + Listed<S>>(self, lobe: &B);
     /// One that a host brought along.
     fn host(self, lobe: &host::Host<S>);
+}
+
+/// A lobe of the list.
+pub(crate) trait Listed<S: Real>: Sized {
+    /// The lobe in its case, if it is of this kind.
+    fn listed(any: &AnyLobe<S>) -> Option<&Self>;
 }
 
 macro_rules! lobes {
@@ -363,6 +208,19 @@ macro_rules! lobes {
             Host(host::Host<S>),
         }
 
+        $(
+            $( #[cfg(feature = $family)] )?
+            impl<S: Real> Listed<S> for $module::$Lobe<S> {
+                #[inline(always)]
+                fn listed(any: &AnyLobe<S>) -> Option<&Self> {
+                    match any {
+                        AnyLobe::$Lobe(lobe) => Some(lobe),
+                        _ => None,
+                    }
+                }
+            }
+        )*
+
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
             pub fn new(kind: LobeKind, values: &[f32], wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
@@ -372,22 +230,39 @@ macro_rules! lobes {
                     LobeKind::Host(host) => AnyLobe::Host(host::Host::prepare(host, values, wo)),
                 }
             }
-            /// See [`Lobe::toward`]. Written in place, because there is room for the largest lobe. False, and nothing is
+            /// See [`Lobe::seen`]. Written in place, because there is room for the largest lobe. `None`, and nothing is
             /// written, if there is no shorter way than [`new`](Self::new).
             #[inline(always)]
-            pub(crate) fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
+            pub(crate) fn turn(
+                &self,
+                wo: V3<S>,
+                curve: &AlbedoCurve<S::Entry>,
+                bound: bool,
+                to: &mut AnyLobe<S>,
+            ) -> Option<[Rgb<S>; 2]> {
                 match self {
-                    AnyLobe::Diffuse(l) => turned(l, wo, curve, to, AnyLobe::Diffuse),
+                    AnyLobe::Diffuse(l) => turned(l, wo, curve, bound, to, AnyLobe::Diffuse),
                     #[cfg(feature = "cloth")]
-                    AnyLobe::Sheen(l) => turned(l, wo, curve, to, AnyLobe::Sheen),
-                    _ => self.turn_apart(wo, curve, to),
+                    AnyLobe::Sheen(l) => turned(l, wo, curve, bound, to, AnyLobe::Sheen),
+                    AnyLobe::OrenNayar(l) => turned(l, wo, curve, bound, to, AnyLobe::OrenNayar),
+                    _ => {
+                        // As numbers: what comes from a call stays in memory.
+                        let [[a, b, c], [d, e, f]] = self.turn_apart(wo.apart(), curve, bound, to)?;
+                        Some([[a, b, c], [d, e, f]])
+                    }
                 }
             }
             #[inline(never)]
-            fn turn_apart(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, to: &mut AnyLobe<S>) -> bool {
+            fn turn_apart(
+                &self,
+                wo: V3<S>,
+                curve: &AlbedoCurve<S::Entry>,
+                bound: bool,
+                to: &mut AnyLobe<S>,
+            ) -> Option<[Rgb<S>; 2]> {
                 match self {
-                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => turned(l, wo, curve, to, AnyLobe::$Lobe), )*
-                    AnyLobe::Host(_) => false,
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => turned(l, wo, curve, bound, to, AnyLobe::$Lobe), )*
+                    AnyLobe::Host(_) => None,
                 }
             }
             /// What it is.
@@ -402,7 +277,7 @@ macro_rules! lobes {
                     #[cfg(feature = "cloth")]
                     AnyLobe::Sheen(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
                     AnyLobe::OrenNayar(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
-                    _ => self.evaluate_apart(wi, curve, bound),
+                    _ => self.evaluate_apart(wi.apart(), curve, bound),
                 }
             }
             /// Apart, so that a walk stays short whatever lobes there are.
@@ -473,10 +348,27 @@ macro_rules! lobes {
                     AnyLobe::Sheen(l) => albedos(l, w, curve, bound),
                     AnyLobe::OrenNayar(l) => albedos(l, w, curve, bound),
                     _ => {
-                        let bound = if bound { self.albedo_bound(w, curve) } else { [S::zero(); 3] };
-                        [self.albedo(w, curve), bound]
+                        let bound = if bound { self.albedo_bound(w.apart(), curve) } else { [S::zero(); 3] };
+                        [self.albedo(w.apart(), curve), bound]
                     }
                 }
+            }
+
+            /// Of a sample: the index of refraction on ωi's side over that on ωo's, and [`roughness`](Self::roughness).
+            #[inline(always)]
+            pub(crate) fn crossing(&self, wi: V3<S>) -> (S, S) {
+                match self {
+                    AnyLobe::Diffuse(_) => (S::one(), S::one()),
+                    #[cfg(feature = "cloth")]
+                    AnyLobe::Sheen(_) => (S::one(), S::one()),
+                    AnyLobe::OrenNayar(_) => (S::one(), S::one()),
+                    _ => self.crossing_apart(wi.apart()),
+                }
+            }
+
+            #[inline(never)]
+            fn crossing_apart(&self, wi: V3<S>) -> (S, S) {
+                (S::one() / self.relative_eta(wi), self.roughness())
             }
 
             /// The smallest of them, black: until another takes its place.

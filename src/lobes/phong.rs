@@ -156,7 +156,7 @@ impl<S: Real> Lobe<S> for Phong<S> {
         let ln = (one - u[0]).max(S::c(1e-30)).ln() / (self.exponent + one);
         let cos = ln.exp();
         let sin2 = (one - cos) * (one + cos);
-        let (sin, (sin_phi, cos_phi)) = (sin2.safe_sqrt(), (u[1] * S::c(TAU)).sin_cos());
+        let (sin, (sin_phi, cos_phi)) = (sin2.safe_sqrt(), u[1].sin_cos_of_turns());
         let axis = V3::new(-self.wo.x, -self.wo.y, self.wo.z);
         let (t, b) = sampling::around(axis);
         let w = axis.scale(cos) + t.scale(sin * cos_phi) + b.scale(sin * sin_phi);

@@ -6,8 +6,8 @@
 //! further facets F̃ = F̄²·Ē/(1 − F̄·(1 − Ē)) comes back, F̄ the mean of F over the hemisphere, Ē = 1 − M̄. Where nothing
 //! is known of E, M is 0 and the light is lost.
 
-use super::Rgb;
 use super::registry::LobeSpec;
+use super::{Evaluated, Rgb};
 use crate::albedo::facets::{FacetKey, FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
 use crate::optics::film::{self, Film};
 use crate::optics::microfacet::{Facets, Shape, mirror};
@@ -210,7 +210,7 @@ impl<S: Real> Reflector<S> {
     ) -> Self {
         let alpha = widths(alpha).map(S::from_f32);
         let facets = Facets::new(shape, alpha);
-        let missing = tables.missing(wo, alpha);
+        let (missing, reach) = (tables.missing(wo, alpha), facets.reach(wo));
         let mean = tables.mean_missing(false, alpha);
         let kept = reflectance.mean().map(|f| f * f * (S::one() - mean) / (S::one() - f * mean).max(S::c(1e-6)));
         let scale = S::c(FRAC_1_PI) * missing / mean.max(S::c(1e-30));
@@ -218,8 +218,8 @@ impl<S: Real> Reflector<S> {
             wo,
             facets,
             reflectance,
-            reach: facets.reach(wo),
-            proposal: facets.proposal().reach(wo),
+            reach,
+            proposal: if facets.is_proposal() { reach } else { facets.proposal().reach(wo) },
             again: kept.map(|k| k * scale),
             kept,
             even: missing * kept[0].max(kept[1]).max(kept[2]),
@@ -232,29 +232,43 @@ impl<S: Real> Reflector<S> {
 
     #[inline(always)]
     pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
-        let wo = V3::<L>::lift(self.wo);
-        let h = wo + wi;
-        let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
-        let single = self.facets.d(h) * L::c(0.5) / shadowed.max(L::c(1e-18));
-        let c = L::c(0.5) * h.length_squared().sqrt();
-        // 1 − c² is the square of half the difference.
-        let fall = L::c(0.25) * (wo - wi).length_squared() / (L::one() + c);
-        let part = self.reflectance.at(c, fall);
-        let missing = tables.missing(wi, self.facets.alpha());
-        let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
-        rgb!(c => {
-            let f = part[c].mul_add(single, L::lift(self.again[c]) * missing);
-            L::select(lit, f, L::zero())
-        })
+        self.scattered(wi, tables.missing(wi, self.facets.alpha())).0
     }
 
     #[inline(always)]
     pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
+        self.scattered(wi, L::zero()).1
+    }
+
+    /// All at once.
+    #[inline(always)]
+    pub(super) fn evaluate<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>, bound: bool) -> Evaluated<L> {
+        let missing = tables.missing(wi, self.facets.alpha());
+        let (f, pdf) = self.scattered(wi, missing);
+        let bound = if bound { self.total(wi, tables, missing, tables.bound(wi)) } else { [L::zero(); 3] };
+        Evaluated { f, pdf, bound }
+    }
+
+    /// f, where `missing` is what the tables say at ωi, and the density.
+    #[inline(always)]
+    fn scattered<L: Over<S>>(&self, wi: V3<L>, missing: L) -> (Rgb<L>, L) {
         let wo = V3::<L>::lift(self.wo);
-        let facet = self.facets.mirrored_pdf(wo + wi, wo.z, L::lift(self.proposal));
+        let h = wo + wi;
+        let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
+        let (d, facet) = self.facets.d_and_mirrored_pdf(h, wo.z, L::lift(self.proposal));
+        let single = d * L::c(0.5) / shadowed.max(L::c(1e-18));
+        let c = L::c(0.5) * h.length_squared().sqrt();
+        // 1 − c² is the square of half the difference.
+        let fall = L::c(0.25) * (wo - wi).length_squared() / (L::one() + c);
+        let part = self.reflectance.at(c, fall);
         let even = L::lift(self.even);
         let pdf = (L::one() - even).mul_add(facet, even * sampling::cosine_hemisphere_pdf(wi.z));
-        L::select(wo.z.gt(L::zero()) & wi.z.gt(L::zero()), pdf, L::zero())
+        let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
+        let f = rgb!(c => {
+            let f = part[c].mul_add(single, L::lift(self.again[c]) * missing);
+            L::select(lit, f, L::zero())
+        });
+        (f, L::select(lit, pdf, L::zero()))
     }
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
@@ -266,18 +280,17 @@ impl<S: Real> Reflector<S> {
 
     /// Best estimate of the albedo.
     pub(super) fn albedo(&self, w: V3<S>, tables: &FacetTables<S::Entry>) -> Rgb<S> {
-        self.total(w, tables, tables.view(w))
+        self.total(w, tables, tables.missing(w, self.facets.alpha()), tables.view(w))
     }
 
     /// Never below the albedo.
     #[inline(always)]
     pub(super) fn albedo_bound<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
-        self.total(w, tables, tables.bound(w))
+        self.total(w, tables, tables.missing(w, self.facets.alpha()), tables.bound(w))
     }
 
     #[inline(always)]
-    fn total<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>, parts: [L; PARTS]) -> Rgb<L> {
-        let missing = tables.missing(w, self.facets.alpha());
+    fn total<L: Over<S>>(&self, w: V3<L>, tables: &FacetTables<S::Entry>, missing: L, parts: [L; PARTS]) -> Rgb<L> {
         let white = matches!(self.reflectance, Reflectance::White);
         rgb!(c => {
             // Without parts: all that is not missing, which no reflectance exceeds.

@@ -17,7 +17,7 @@ use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{
     DISTRIBUTIONS, Reflectance, Reflector, coated_glass, known_width, known_widths, metal_reflectance, widths,
 };
-use super::{Lobe, Rgb, Sides};
+use super::{Evaluated, Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3, rgb};
@@ -220,6 +220,17 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
         match self {
             Coat(surface, tint) => tinted(tint, surface.albedo_bound(w, curve.facets())),
             Glass(surface) => surface.albedo_bound(w, curve.facets()),
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
+        match self {
+            Coat(surface, tint) => {
+                let e = surface.evaluate(wi, curve.facets(), bound);
+                Evaluated { f: tinted(tint, e.f), bound: tinted(tint, e.bound), ..e }
+            }
+            Glass(surface) => surface.evaluate(wi, curve.facets(), bound),
         }
     }
 

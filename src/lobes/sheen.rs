@@ -29,7 +29,7 @@ use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Evaluated, Lobe, LobeKind, Rgb};
+use super::{Evaluated, Lobe, LobeKind, Rgb, apart};
 use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, Cells, CurveSpec};
 use crate::optics::{Over, Real, Scalar, V3};
@@ -200,16 +200,16 @@ struct FittedFor<S> {
 }
 
 impl<S: Real> FittedFor<S> {
-    /// Λ toward the viewer, which is never softened.
+    /// Λ toward the viewer, which is never softened, and the albedo there if it is at hand.
     #[inline(always)]
-    fn lambda_o(&self, wo: V3<S>, known: Known<'_, S::Entry>) -> S {
+    fn lambda_o(&self, wo: V3<S>, known: Known<'_, S::Entry>) -> (S, Option<S>) {
         let cos = fitted_cosine(wo);
         if let Some(cells) = known.cells
-            && let Some((lambda, _)) = charlie::read_viewer(cells, cos)
+            && let Some((lambda, albedo)) = charlie::read_viewer(cells, cos)
         {
-            return lambda;
+            return (lambda, Some(lit(wo, albedo)));
         }
-        self.fit.lambda(cos, S::zero())
+        (self.fit.lambda(cos, S::zero()), None)
     }
 
     /// Λ toward a light.
@@ -276,17 +276,19 @@ impl<S: Real> Sheen<S> {
             row => ltc::read_row(row, wo.z),
         };
         let ltc = Ltc::new([S::one(), S::one(), S::zero(), S::one()], wo);
-        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }.aimed(wo, params, known)
+        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }.aimed(wo, params, known).0
     }
 
-    /// Turned toward ωo, where its transformed cosine has the parameters `params`.
+    /// Turned toward ωo, where its transformed cosine has the parameters `params`; and its albedo there if it is at hand.
     #[inline(always)]
-    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S::Entry>) -> Self {
+    fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S::Entry>) -> (Self, Option<S>) {
         let [a, b, c, share] = params;
-        let mut uniform = share;
+        let (mut uniform, mut albedo) = (share, None);
         let shadowing = match self.shadowing {
             Shadowing::Fitted(fitted) => {
-                let lambda_o = S::one() + fitted.lambda_o(wo, known);
+                let (lambda, at_hand) = fitted.lambda_o(wo, known);
+                albedo = at_hand;
+                let lambda_o = S::one() + lambda;
                 Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / fitted_cosine(wo), ..fitted })
             }
             Shadowing::Exact { exact, .. } => {
@@ -299,7 +301,7 @@ impl<S: Real> Sheen<S> {
                 Shadowing::Transformed { albedo: share }
             }
         };
-        Sheen { wo, shadowing, ltc: Ltc::new([a, b, c, uniform], wo), ..self }
+        (Sheen { wo, shadowing, ltc: Ltc::new([a, b, c, uniform], wo), ..self }, albedo)
     }
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
@@ -523,11 +525,23 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
+        self.seen(wo, curve, false).map(|(lobe, _)| lobe)
+    }
+
+    #[inline(always)]
+    fn seen(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Option<(Self, [Rgb<S>; 2])> {
         let (known, excess) = (Known::of(curve), curve.excess(wo, self.roughness));
-        match known.row {
-            [] => None,
-            row => Some(Sheen { excess, ..self.aimed(wo, ltc::read_row(row, wo.z), known) }),
+        if known.row.is_empty() {
+            return None;
         }
+        let (aimed, albedo) = self.aimed(wo, ltc::read_row(known.row, wo.z), known);
+        let lobe = Sheen { excess, ..aimed };
+        let albedo = match albedo {
+            Some(albedo) => [albedo; 3],
+            None => lobe.albedo(wo, curve),
+        };
+        let bound = if bound { lobe.albedo_bound(wo, curve) } else { [S::zero(); 3] };
+        Some((lobe, [albedo, bound]))
     }
 
     #[inline(always)]
@@ -554,8 +568,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
             let bound = if bound { lit(wi, most) } else { L::zero() };
             return Evaluated { f: [f; 3], pdf: self.pdf(wi), bound: [bound; 3] };
         }
-        let bound = if bound { self.albedo_bound(wi, curve) } else { [L::zero(); 3] };
-        Evaluated { f: self.f(wi, curve), pdf: self.pdf(wi), bound }
+        apart(self, wi, curve, bound)
     }
 
     #[inline(always)]

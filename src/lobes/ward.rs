@@ -219,7 +219,7 @@ impl<S: Real> Lobe<S> for Ward<S> {
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
         let radius = (-(S::one() - u[0]).max(S::c(1e-30)).ln()).safe_sqrt();
-        let (sin, cos) = (u[1] * S::c(TAU)).sin_cos();
+        let (sin, cos) = u[1].sin_cos_of_turns();
         let h = V3::new(self.alpha[0] * radius * cos, self.alpha[1] * radius * sin, S::one());
         let w = mirror(self.wo, h);
         V3::new(w.x, w.y, w.z.max(S::zero()))

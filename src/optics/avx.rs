@@ -250,6 +250,10 @@ impl Real for Avx {
         elementary::sin_cos(self)
     }
     #[inline(always)]
+    fn sin_cos_of_turns(self) -> (Self, Self) {
+        elementary::sin_cos_of_turns(self)
+    }
+    #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         elementary::atan2(self, x)
     }
@@ -260,6 +264,10 @@ impl Real for Avx {
     #[inline(always)]
     fn le(self, o: Self) -> AvxMask {
         AvxMask(avx!(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, o.0)))
+    }
+    #[inline(always)]
+    fn any(mask: AvxMask) -> bool {
+        avx!(_mm256_movemask_ps(mask.0)) != 0
     }
     #[inline(always)]
     fn select(mask: AvxMask, a: Self, b: Self) -> Self {
@@ -380,6 +388,7 @@ impl Lift<F32x8> for Avx {
 }
 
 impl Lanes for Avx {
+    const VECTORS: bool = true;
     #[inline(always)]
     fn load(rows: &[[f32; 3]; 8]) -> V3<Self> {
         let numbers = rows.as_flattened();

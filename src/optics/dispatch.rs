@@ -25,6 +25,15 @@ pub(crate) trait LaneWork {
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
+/// Whether the processor has vectors that [`lanes`] has code for.
+#[inline]
+pub(crate) fn has_lanes() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::arch::is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
 /// Runs `work` in the widest lanes at hand.
 #[inline]
 pub(crate) fn lanes<W: LaneWork>(work: W) -> W::Output {
@@ -34,7 +43,7 @@ pub(crate) fn lanes<W: LaneWork>(work: W) -> W::Output {
         fn avx2<W: LaneWork>(work: W) -> W::Output {
             work.run::<Avx>()
         }
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if has_lanes() {
             // SAFETY: the processor has just been found to have what `avx2` is compiled for.
             return unsafe { avx2(work) };
         }
@@ -51,7 +60,7 @@ pub fn widest<W: Work>(work: W) -> W::Output {
         fn avx2<W: Work>(work: W) -> W::Output {
             work.run()
         }
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if has_lanes() {
             // SAFETY: the processor has just been found to have what `avx2` is compiled for.
             return unsafe { avx2(work) };
         }

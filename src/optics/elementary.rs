@@ -238,16 +238,31 @@ pub fn sin_cos<R: Single>(x: R) -> (R, R) {
     let n = shifted - k(MAGIC);
     // π/2 in three parts.
     let r = x - n * k(1.570_312_5) - n * k(4.837_513e-4) - n * k(7.549_79e-8);
+    in_quadrant(r, shifted.to_bits())
+}
+
+/// Sine and cosine of 2πu, for |u| up to 4: the quarter turns come off exactly.
+#[inline(always)]
+pub fn sin_cos_of_turns<R: Single>(u: R) -> (R, R) {
+    let quarters = u * k(4.0);
+    let shifted = quarters + k(MAGIC);
+    in_quadrant((quarters - (shifted - k(MAGIC))) * k(FRAC_PI_2), shifted.to_bits())
+}
+
+/// Sine and cosine of `r` in [−π/4, π/4] and as many quarter turns as the last two bits of `q` say.
+#[inline(always)]
+fn in_quadrant<R: Single>(r: R, q: R::Bits) -> (R, R) {
     let z = r * r;
     let s = ((k::<R>(-1.951_529_6e-4) * z + k(8.332_161e-3)) * z - k(1.666_665_5e-1)) * z * r + r;
     let c =
         ((k::<R>(2.443_315_7e-5) * z - k(1.388_731_6e-3)) * z + k(4.166_664_6e-2)) * z * z - k::<R>(0.5) * z + k(1.0);
-    let q = shifted.to_bits();
-    let odd = R::top_bit(q.up::<31>());
-    let (a, b) = (R::select(odd, c, s), R::select(odd, s, c));
-    let sin = R::select(R::top_bit(q.up::<30>()), -a, a);
-    let cos = R::select(R::top_bit(q.plus(R::Bits::of(1)).up::<30>()), -b, b);
-    (sin, cos)
+    // By bits, because a quadrant is a matter of chance: the processor would guess wrong half of the time.
+    let top = R::Bits::of(1 << 31);
+    let (s, c) = (s.to_bits(), c.to_bits());
+    // Exchanged in odd quadrants.
+    let step = c.minus(s).and(q.up::<31>().down_signed::<31>());
+    let flipped = |x: R::Bits, q: R::Bits| R::from_bits(x.plus(q.up::<30>().and(top)));
+    (flipped(s.plus(step), q), flipped(c.minus(step), q.plus(R::Bits::of(1))))
 }
 
 /// The angle of (x, y) in [−π, π]; 0 at the origin.

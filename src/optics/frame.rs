@@ -1,6 +1,6 @@
 //! Orthonormal shading frames.
 
-use super::{Over, Scalar, V3};
+use super::{Over, Real, Scalar, V3};
 
 /// An orthonormal frame: `t` and `b` span the surface, `n` is the normal, t × b = n.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,11 +20,23 @@ impl<S: Scalar> Frame<S> {
     /// parallel to the normal by `fallback_along`, and that by any tangent.
     #[inline(always)]
     pub fn new(n: V3<S>, fallback_n: V3<S>, along: V3<S>, fallback_along: V3<S>) -> Self {
-        let n = normalize(n).or_else(|| normalize(fallback_n)).unwrap_or(V3::new(S::zero(), S::zero(), S::one()));
-        let t = tangent(n, along).or_else(|| tangent(n, fallback_along)).unwrap_or_else(|| any_tangent(n));
+        let n = match to_unit(n.length_squared()) {
+            Some(k) => n.scale(k),
+            None => rare_normal(n.apart(), fallback_n.apart()).apart(),
+        };
+        let t = along - n.scale(n.dot(along));
+        // Half or more is left: nothing has cancelled.
+        let whole = along.length_squared();
+        let left = Some(t.length_squared()).filter(|left| is_ordinary(whole) && Real::gt(*left, whole * S::c(0.25)));
+        let t = match left.and_then(to_unit) {
+            Some(k) => t.scale(k),
+            None => rare_tangent(n.apart(), along.apart(), fallback_along.apart()).apart(),
+        };
         Frame { t, b: n.cross(t), n }
     }
+}
 
+impl<S: Real> Frame<S> {
     /// World to local.
     #[inline(always)]
     pub fn to_local<L: Over<S>>(&self, w: V3<L>) -> V3<L> {
@@ -41,8 +53,37 @@ impl<S: Scalar> Frame<S> {
 /// The unit vector along `v`; `None` if `v` is zero or not finite. Safe for lengths whose square over- or underflows.
 #[inline(always)]
 pub fn normalize<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
-    let square = v.length_squared();
-    if is_ordinary(square) { Some(v.scale(S::one() / square.sqrt())) } else { normalize_extreme(v) }
+    match to_unit(v.length_squared()) {
+        Some(k) => Some(v.scale(k)),
+        None => normalize_extreme(v),
+    }
+}
+
+/// [`normalize`], with 0 for what has no direction.
+#[inline(always)]
+pub fn normalize_or_zero<S: Scalar>(v: V3<S>) -> V3<S> {
+    match to_unit(v.length_squared()) {
+        Some(k) => v.scale(k),
+        None => {
+            let zero = V3::new(S::zero(), S::zero(), S::zero());
+            normalize_extreme(v).unwrap_or(zero).apart()
+        }
+    }
+}
+
+/// What a vector of this squared length is to be scaled by; `None` where that has to be found with more care.
+#[inline(always)]
+fn to_unit<S: Scalar>(square: S) -> Option<S> {
+    let off = square - S::one();
+    if off.abs().lt(S::c(if S::SINGLE { 1e-4 } else { 1e-8 })) {
+        // A unit vector but for rounding, as most are: one of Newton's steps in place of a root and a division. It leaves
+        // 3/8·off², below the last digit.
+        Some(S::c(-0.5).mul_add(off, S::one()))
+    } else if is_ordinary(square) {
+        Some(S::one() / square.sqrt())
+    } else {
+        None
+    }
 }
 
 /// Whether a squared length is far from where squares over- or underflow; never for NaN.
@@ -63,21 +104,20 @@ fn normalize_extreme<S: Scalar>(v: V3<S>) -> Option<V3<S>> {
     Some(u.scale(S::one() / u.length_squared().sqrt()))
 }
 
-/// The part of `along` perpendicular to the unit vector `n`, normalised; `None` if less than 1e-6 of it is left.
-#[inline(always)]
-fn tangent<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
-    let t = along - n.scale(n.dot(along));
-    let (square, whole) = (t.length_squared(), along.length_squared());
-    // Half or more is left: nothing has cancelled.
-    if is_ordinary(whole) && square.gt(whole * S::c(0.25)) {
-        return Some(t.scale(S::one() / square.sqrt()));
-    }
-    tangent_near(n, along)
+/// The normal of a frame whose first choice is no ordinary vector.
+#[cold]
+fn rare_normal<S: Scalar>(n: V3<S>, fallback: V3<S>) -> V3<S> {
+    normalize_extreme(n).or_else(|| normalize(fallback)).unwrap_or(V3::new(S::zero(), S::zero(), S::one()))
 }
 
-/// [`tangent`] where `along` is nearly parallel to the normal, or its square not a number to rely on.
+/// The tangent of a frame whose first choice is nearly parallel to the normal, or no ordinary vector.
 #[cold]
-fn tangent_near<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
+fn rare_tangent<S: Scalar>(n: V3<S>, along: V3<S>, fallback: V3<S>) -> V3<S> {
+    tangent(n, along).or_else(|| tangent(n, fallback)).unwrap_or_else(|| any_tangent(n))
+}
+
+/// The part of `along` perpendicular to the unit vector `n`, normalised; `None` if less than 1e-6 of it is left.
+fn tangent<S: Scalar>(n: V3<S>, along: V3<S>) -> Option<V3<S>> {
     let a = normalize(along)?;
     let t = a - n.scale(n.dot(a));
     if t.length_squared().lt(S::c(1e-12)) {

@@ -48,6 +48,10 @@ macro_rules! shared_scalar {
             self <= o
         }
         #[inline(always)]
+        fn any(mask: bool) -> bool {
+            mask
+        }
+        #[inline(always)]
         fn select(mask: bool, a: Self, b: Self) -> Self {
             if mask { a } else { b }
         }
@@ -150,6 +154,10 @@ impl Real for f32 {
         elementary::sin_cos(self)
     }
     #[inline(always)]
+    fn sin_cos_of_turns(self) -> (Self, Self) {
+        elementary::sin_cos_of_turns(self)
+    }
+    #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         elementary::atan2(self, x)
     }
@@ -197,7 +205,9 @@ impl Scalar for f32 {
 pub struct F32x8(pub [f32; 8]);
 
 /// Eight `f32` side by side, whatever they are kept in.
-pub(crate) trait Lanes: Real<Entry = f32> + Lift<f32> {
+pub(crate) trait Lanes: Real<Entry = f32> + Lift<f32> + Lift<F32x8> {
+    /// Whether they are the processor's own vectors.
+    const VECTORS: bool;
     /// Three columns of eight rows.
     fn load(rows: &[[f32; 3]; 8]) -> V3<Self>;
     /// Eight rows of four columns.
@@ -207,6 +217,7 @@ pub(crate) trait Lanes: Real<Entry = f32> + Lift<f32> {
 }
 
 impl Lanes for F32x8 {
+    const VECTORS: bool = false;
     #[inline(always)]
     fn load(rows: &[[f32; 3]; 8]) -> V3<Self> {
         let column = |c: usize| F32x8(std::array::from_fn(|i| rows[i][c]));
@@ -382,6 +393,10 @@ impl Real for F32x8 {
         let both = self.0.map(elementary::sin_cos);
         (F32x8(both.map(|b| b.0)), F32x8(both.map(|b| b.1)))
     }
+    fn sin_cos_of_turns(self) -> (Self, Self) {
+        let both = self.0.map(elementary::sin_cos_of_turns);
+        (F32x8(both.map(|b| b.0)), F32x8(both.map(|b| b.1)))
+    }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         self.zip(x, elementary::atan2)
@@ -393,6 +408,10 @@ impl Real for F32x8 {
     #[inline(always)]
     fn le(self, o: Self) -> Mask8 {
         self.test(o, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn any(mask: Mask8) -> bool {
+        mask.0.iter().any(|m| *m)
     }
     #[inline(always)]
     fn select(mask: Mask8, a: Self, b: Self) -> Self {

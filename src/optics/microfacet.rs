@@ -10,7 +10,7 @@
 //! keep their digits where a normalised h would have lost them, so that α = 1e-4 works in single precision.
 
 use super::{Over, Real, V3};
-use std::f64::consts::{FRAC_1_PI, TAU};
+use std::f64::consts::FRAC_1_PI;
 
 /// The distribution of slopes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -42,6 +42,12 @@ impl<S: Real> Facets<S> {
     #[inline(always)]
     pub fn proposal(&self) -> Self {
         Facets { shape: Shape::Ggx, ..*self }
+    }
+
+    /// Whether it is its own [`proposal`](Self::proposal).
+    #[inline(always)]
+    pub fn is_proposal(&self) -> bool {
+        self.shape == Shape::Ggx
     }
 
     /// The widths along x and y.
@@ -93,7 +99,7 @@ impl<S: Real> Facets<S> {
     /// visible facets of [`proposal`](Self::proposal); spherical caps, Dupuy & Benyoub 2023, listing 3.
     #[inline(always)]
     pub fn visible(&self, wo: V3<S>, u: [S; 2]) -> V3<S> {
-        self.seen_at(self.squeezed(wo), (u[0] * S::c(TAU)).sin_cos(), u[1])
+        self.seen_at(self.squeezed(wo), u[0].sin_cos_of_turns(), u[1])
     }
 
     /// Where `wo` points once the surface is squeezed until its facets cover a hemisphere.
@@ -117,7 +123,15 @@ impl<S: Real> Facets<S> {
     /// the proposal's ℓ(ωo).
     #[inline(always)]
     pub fn mirrored_pdf<L: Over<S>>(&self, h: V3<L>, cos_o: L, reach_o: L) -> L {
-        self.proposal().d(h) * L::c(0.5) / (cos_o + reach_o).max(L::c(1e-18))
+        self.d_and_mirrored_pdf(h, cos_o, reach_o).1
+    }
+
+    /// [`d`](Self::d) and [`mirrored_pdf`](Self::mirrored_pdf).
+    #[inline(always)]
+    pub fn d_and_mirrored_pdf<L: Over<S>>(&self, h: V3<L>, cos_o: L, reach_o: L) -> (L, L) {
+        let d = self.d(h);
+        let proposed = if self.is_proposal() { d } else { self.proposal().d(h) };
+        (d, proposed * L::c(0.5) / (cos_o + reach_o).max(L::c(1e-18)))
     }
 }
 
@@ -159,6 +173,7 @@ pub fn scaled_erfc<R: Real>(a: R) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn the_complementary_error_function_is_as_precise_as_it_says() {

@@ -67,6 +67,10 @@ pub trait Real:
     fn ln(self) -> Self;
     /// Sine and cosine, for |x| up to 8π.
     fn sin_cos(self) -> (Self, Self);
+    /// Sine and cosine of as many turns, 2π times this; for up to 4 of them.
+    fn sin_cos_of_turns(self) -> (Self, Self) {
+        (self * Self::c(core::f64::consts::TAU)).sin_cos()
+    }
     /// The angle of (x, y), in [−π, π]; 0 at the origin.
     fn atan2(self, x: Self) -> Self;
 
@@ -84,6 +88,8 @@ pub trait Real:
     fn ge(self, o: Self) -> Self::Mask {
         o.le(self)
     }
+    /// Whether the mask is set anywhere: work that nobody would see can be left out.
+    fn any(mask: Self::Mask) -> bool;
     /// `a` where the mask is set, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
 

@@ -1,14 +1,12 @@
 //! Maps from the unit square to directions, each beside its density.
 
 use super::{Real, V3};
-use std::f64::consts::{FRAC_1_PI, TAU};
+use std::f64::consts::FRAC_1_PI;
 
 /// A direction about z with density cos θ/π.
 #[inline(always)]
 pub fn cosine_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
-    let r = u[0].sqrt();
-    let (s, c) = (u[1] * R::c(TAU)).sin_cos();
-    V3::new(r * c, r * s, (R::one() - u[0]).safe_sqrt())
+    cosine_and_uniform_hemisphere(u).0
 }
 
 /// Density of [`cosine_hemisphere`]; 0 below the surface.
@@ -20,13 +18,13 @@ pub fn cosine_hemisphere_pdf<R: Real>(cos: R) -> R {
 /// A direction about z, uniform over the upper hemisphere.
 #[inline(always)]
 pub fn uniform_hemisphere<R: Real>(u: [R; 2]) -> V3<R> {
-    V3::polar(u[0], u[1] * R::c(TAU))
+    cosine_and_uniform_hemisphere(u).1
 }
 
 /// [`cosine_hemisphere`] and [`uniform_hemisphere`] of the same numbers.
 #[inline(always)]
 pub(crate) fn cosine_and_uniform_hemisphere<R: Real>(u: [R; 2]) -> (V3<R>, V3<R>) {
-    let (s, c) = (u[1] * R::c(TAU)).sin_cos();
+    let (s, c) = u[1].sin_cos_of_turns();
     let (root, sin) = (u[0].sqrt(), (R::one() - u[0] * u[0]).safe_sqrt());
     (V3::new(root * c, root * s, (R::one() - u[0]).safe_sqrt()), V3::new(sin * c, sin * s, u[0]))
 }

@@ -21,6 +21,13 @@ impl<T> V3<T> {
         V3 { x, y, z }
     }
 
+    /// The same in a place of its own. What is passed to a call by reference, or comes from one, is kept in memory all its
+    /// life; this copy need not be.
+    #[inline(always)]
+    pub fn apart(self) -> Self {
+        V3::new(self.x, self.y, self.z)
+    }
+
     /// `f` of each component.
     #[inline(always)]
     pub fn map<U>(self, f: impl Fn(T) -> U) -> V3<U> {
@@ -39,6 +46,7 @@ impl<R: Real> V3<R> {
     }
 
     /// From script values.
+    #[inline(always)]
     pub fn from_f32(v: [f32; 3]) -> Self {
         V3::new(R::from_f32(v[0]), R::from_f32(v[1]), R::from_f32(v[2]))
     }

@@ -97,7 +97,15 @@ fn sines_and_angles() {
         let (y, x) = (s * r, c * r);
         worst.1 = worst.1.max((elementary::atan2(y, x) as f64 - (y as f64).atan2(x as f64)).abs());
     }
-    println!("sin, cos {:.2e}, atan2 {:.2e}", worst.0, worst.1);
+    let mut turned = 0.0f64;
+    for k in -40_000i32..=40_000 {
+        let u = k as f32 * 1e-4;
+        let (s, c) = elementary::sin_cos_of_turns(u);
+        let (sine, cosine) = (std::f64::consts::TAU * u as f64).sin_cos();
+        turned = turned.max((s as f64 - sine).abs()).max((c as f64 - cosine).abs());
+    }
+    println!("sin, cos {:.2e}, of turns {turned:.2e}, atan2 {:.2e}", worst.0, worst.1);
+    assert!(turned < 1e-7, "{turned:e}");
     assert!(worst.0 < 1.5e-7 && worst.1 < 3e-7, "{worst:?}");
     assert_eq!(elementary::atan2(0.0, 0.0), 0.0);
     assert_eq!(elementary::atan2(1.0, 0.0), std::f32::consts::FRAC_PI_2);
@@ -111,11 +119,12 @@ fn lanes_and_scalars_share_every_function() {
     let xs: Vec<f32> = spread().step_by(7).flat_map(|x| [x, -x]).chain([0.0, -0.0, f32::INFINITY, f32::NAN]).collect();
     for chunk in xs.chunks_exact(8) {
         let lanes = F32x8(chunk.try_into().unwrap());
-        let pairs: [Pair; 8] = [
+        let pairs: [Pair; 9] = [
             (lanes.exp(), Real::exp),
             (lanes.ln(), Real::ln),
             (lanes.abs().sqrt(), |x| x.abs().sqrt()),
             (lanes.sin_cos().0, |x| Real::sin_cos(x).0),
+            (lanes.sin_cos_of_turns().1, |x| Real::sin_cos_of_turns(x).1),
             (lanes.atan2(F32x8::c(0.5)), |x| Real::atan2(x, 0.5)),
             (lanes.powf(F32x8::c(0.3)), |x| Real::powf(x, 0.3)),
             (lanes.abs().ln_1p(), |x| Real::ln_1p(x.abs())),
