@@ -104,7 +104,7 @@ fn velvet_to_bsdf(bencher: Bencher) {
     let material = material(VELVET);
     let globals = Globals::default();
     let wo = glam::vec3(0.48, 0.36, 0.8);
-    bencher.bench_local(|| material.shade(black_box(&globals), black_box(wo)).is_ok());
+    bencher.bench_local(|| material.shade(black_box(&globals), *black_box(&wo)).is_ok());
 }
 
 fn main() {

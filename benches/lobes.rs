@@ -75,7 +75,7 @@ fn each<A, B>(
         let (bsdf, wi) = (material.shade_reference(&globals, WO).expect("shades"), directions());
         bencher.counter(ItemsCount::new(wi.len())).bench_local(|| {
             for w in &wi {
-                black_box(double(&bsdf, black_box(*w)));
+                black_box(double(&bsdf, *black_box(w)));
             }
         });
     } else {
@@ -83,7 +83,7 @@ fn each<A, B>(
         let (bsdf, wi) = (material.shade(&globals, wo).expect("shades"), directions());
         bencher.counter(ItemsCount::new(wi.len())).bench_local(|| {
             for w in &wi {
-                black_box(single(&bsdf, black_box(*w)));
+                black_box(single(&bsdf, *black_box(w)));
             }
         });
     }
@@ -93,10 +93,10 @@ fn each<A, B>(
 fn shade(bencher: Bencher, case: &Case) {
     let (material, globals) = (material(case), Globals::default());
     if case.tier == Tier::Reference {
-        bencher.bench_local(|| black_box(material.shade_reference(&globals, black_box(WO))).map(|b| b.lobe_count()));
+        bencher.bench_local(|| black_box(material.shade_reference(&globals, *black_box(&WO))).map(|b| b.lobe_count()));
     } else {
         let wo = WO.map(|x| x as f32);
-        bencher.bench_local(|| black_box(material.shade(&globals, black_box(wo).into())).map(|b| b.lobe_count()));
+        bencher.bench_local(|| black_box(material.shade(&globals, (*black_box(&wo)).into())).map(|b| b.lobe_count()));
     }
 }
 

@@ -1,4 +1,7 @@
 //! What the benches of shading measure: layered stacks, and where they are seen from.
+//!
+//! Directions are handed over by reference until the call: three numbers that have just been put down are not at hand as a
+//! direction before all calls before have ended, and no renderer would have it so.
 
 use overcoat::{Engine, Material};
 
@@ -42,4 +45,10 @@ pub fn directions() -> Vec<[f32; 3]> {
         [r * a.cos(), r * a.sin(), z]
     };
     (0..1024).map(|i| direction(i * 389 % 1024)).collect()
+}
+
+/// As many triples of numbers to sample with.
+#[allow(dead_code, reason = "not all of them sample")]
+pub fn numbers() -> Vec<[f32; 3]> {
+    directions().iter().map(|w| w.map(|x| 0.5 * x + 0.5)).collect()
 }

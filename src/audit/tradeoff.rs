@@ -169,7 +169,7 @@ fn point(made: &Made, truth: &Material, globals: &Globals, whole: [f64; COSINES.
     let (calls, batch, setup, bsdf_bytes) = if double {
         let bsdf = material.shade_reference(globals, wo)?;
         let setup = || {
-            black_box(material.shade_reference(black_box(globals), black_box(wo)).is_ok());
+            black_box(material.shade_reference(black_box(globals), *black_box(&wo)).is_ok());
         };
         (clock::calls(&bsdf), None, clock::nanoseconds(setup), bsdf.bytes())
     } else {
@@ -177,7 +177,7 @@ fn point(made: &Made, truth: &Material, globals: &Globals, whole: [f64; COSINES.
         let (bsdf, mut scratch) = (material.shade(globals, wo)?, Scratch::new());
         // Into memory that is used again, as renderers do.
         let setup = || {
-            black_box(material.shade_in(black_box(globals), black_box(wo), &mut scratch).is_ok());
+            black_box(material.shade_in(black_box(globals), *black_box(&wo), &mut scratch).is_ok());
         };
         (clock::calls(&bsdf), Some(clock::batch(&bsdf)), clock::nanoseconds(setup), bsdf.bytes())
     };

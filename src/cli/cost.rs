@@ -39,7 +39,7 @@ pub(super) fn measure(material: &Material) -> Result<Value, Failure> {
     // Into memory that is used again, as renderers do.
     let mut scratch = Scratch::new();
     let setup = nanoseconds(|| {
-        black_box(material.shade_in(black_box(&globals_at), black_box(wo), &mut scratch).is_ok());
+        black_box(material.shade_in(black_box(&globals_at), *black_box(&wo), &mut scratch).is_ok());
     });
     let ((eval, sample), batch) = (clock::calls(&bsdf), clock::batch(&bsdf));
     let round = |x: f64| (x * 10.0).round() / 10.0;
