@@ -21,7 +21,7 @@ use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
 use super::registry::ClosureParams;
 use super::{Lobe, Rgb, Rgb32};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, HORIZON, Ridges, TableSpec};
-use crate::optics::{F32x8, Over, Real, V3, lifted, rgb, sampling};
+use crate::optics::{F32x8, Lanes, Over, Real, V3, dispatch, lifted, rgb, sampling};
 use std::f64::consts::PI;
 use std::marker::PhantomData;
 
@@ -391,6 +391,7 @@ impl<S: Real> Cloth<S> {
     }
 
     /// What one family adds to [`parts`](Self::parts).
+    #[inline(always)]
     fn part<L: Over<S>>(&self, family: usize, wi: V3<L>) -> [L; COMPONENTS] {
         let above = wi.z.gt(L::zero());
         let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
@@ -564,13 +565,31 @@ pub fn table(kernel: FibreKernel, key: FibreKey, yarns: &[Yarn; 2]) -> TableSpec
 
 /// One family's components of f for many ωi, before any division.
 pub fn integrate(yarns: &[Yarn; 2], family: usize, wo: V3<f64>, wi: &[V3<f64>], out: &mut [[f64; COMPONENTS]]) {
-    // Eight at a time in single precision: these sums are what baking a cloth spends its time on.
+    // Eight at a time in single precision, in the widest vectors at hand: these sums are what baking a cloth spends its
+    // time on.
     let cloth = Cloth::<f32>::prepare(yarns, wo.map(|x| x as f32), &AlbedoCurve::default(), false);
-    for (out, wi) in out.chunks_mut(8).zip(wi.chunks(8)) {
-        let lanes = |pick: fn(V3<f64>) -> f64| F32x8(std::array::from_fn(|k| pick(wi[k.min(wi.len() - 1)]) as f32));
-        let parts = cloth.part(family, V3::new(lanes(|w| w.x), lanes(|w| w.y), lanes(|w| w.z)));
-        for (k, out) in out.iter_mut().enumerate() {
-            *out = parts.map(|p| p.0[k] as f64);
+    dispatch::lanes(Ring { cloth: &cloth, family, wi, out });
+}
+
+/// The work of [`integrate`].
+struct Ring<'a> {
+    cloth: &'a Cloth<f32>,
+    family: usize,
+    wi: &'a [V3<f64>],
+    out: &'a mut [[f64; COMPONENTS]],
+}
+
+impl dispatch::LaneWork for Ring<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for (out, wi) in self.out.chunks_mut(F32x8::LANES).zip(self.wi.chunks(F32x8::LANES)) {
+            let rows = std::array::from_fn(|k| wi[k.min(wi.len() - 1)]).map(|w| [w.x, w.y, w.z].map(|x| x as f32));
+            let [surface, warp, weft] = self.cloth.part(self.family, L::load(&rows));
+            for (out, parts) in out.iter_mut().zip(L::store([surface, warp, weft, L::zero()])) {
+                *out = [parts[0], parts[1], parts[2]].map(f64::from);
+            }
         }
     }
 }

@@ -11,6 +11,9 @@ use overcoat::lobes::registry::{ParamSpec, ParamTy};
 use overcoat::optics::{Scalar, V3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
 /// A tree with its tables, ready to be looked at from any direction.
 pub struct Stack<S: Scalar> {
@@ -74,9 +77,8 @@ pub fn rounding(f: impl Fn([f64; 3], [f64; 3]) -> f64, a: [f64; 3], b: [f64; 3])
 
 /// One lobe on its own, with N = +z and T = +x where it takes them.
 pub fn lobe(tree: &mut ClosureTree, kind: LobeKind, set: &[(&str, f32)]) -> NodeId {
-    let values = block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1));
     let site = tree.len() as u32;
-    tree.lobe(kind, site, &values)
+    tree.lobe(kind, site, &with(kind, set))
 }
 
 /// A tree of nothing but that lobe.
@@ -85,6 +87,32 @@ pub fn alone(kind: LobeKind, set: &[(&str, f32)]) -> ClosureTree {
     let root = lobe(&mut tree, kind, set);
     tree.set_root(root);
     tree
+}
+
+/// A lobe on its own, of the standard tier; what is baked for one test serves the others.
+pub fn single<S: Scalar>(kind: LobeKind, values: &[f32]) -> Arc<Stack<S>> {
+    type Shared = Arc<dyn Any + Send + Sync>;
+    type Key = (TypeId, &'static str, Vec<u32>);
+    static STACKS: LazyLock<Mutex<HashMap<Key, Arc<OnceLock<Shared>>>>> = LazyLock::new(Mutex::default);
+    let key = (TypeId::of::<S>(), kind.spec().name, values.iter().map(|v| v.to_bits()).collect());
+    let entry = STACKS.lock().expect("no test panics here").entry(key).or_default().clone();
+    let shared = entry.get_or_init(|| {
+        let mut tree = ClosureTree::new();
+        let lobe = tree.lobe(kind, 0, values);
+        tree.set_root(lobe);
+        Arc::new(Stack::<S>::new(tree, Precision::STANDARD))
+    });
+    shared.clone().downcast().expect("keyed by its type")
+}
+
+/// The same, with these parameters and defaults for the others.
+pub fn single_with<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Arc<Stack<S>> {
+    single(kind, &with(kind, set))
+}
+
+/// A parameter block with these and defaults for the others.
+fn with(kind: LobeKind, set: &[(&str, f32)]) -> Vec<f32> {
+    block(kind, |p| set.iter().find(|s| s.0 == p.name).map(|s| s.1))
 }
 
 /// A parameter block: `pick` gives a value per parameter, else its default.

@@ -1,16 +1,12 @@
 //! The lobes that follow a thread: against reference values, at the thread's poles, and how well they are sampled.
 #![cfg(feature = "cloth")]
 
-use crate::common::{Stack, alone, block, table};
+use crate::common::{Stack, block, single_with, table};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::lobes::{LobeKind, cylinder, fabric};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-
-fn stack(kind: LobeKind, set: &[(&str, f32)]) -> Stack<f32> {
-    Stack::new(alone(kind, set), Precision::STANDARD)
-}
 
 /// The direction at angle `theta` along the thread and `phi` around it, in degrees.
 fn around(theta: f64, phi: f64) -> [f32; 3] {
@@ -60,7 +56,7 @@ fn fabric_constants_hold_for_any_exponent() {
 }
 
 fn never_gains(kind: LobeKind, set: &[(&str, f32)]) -> f64 {
-    let stack = stack(kind, set);
+    let stack = single_with::<f32>(kind, set);
     let mut largest = 0.0f64;
     for (theta, phi) in PLACES {
         let w = around(theta, phi);
@@ -92,7 +88,7 @@ fn pdf_integral(stack: &Stack<f32>, wo: [f32; 3]) -> f64 {
 }
 
 fn samples_well(kind: LobeKind, set: &[(&str, f32)], rng: &mut Pcg64Mcg) {
-    let stack = stack(kind, set);
+    let stack = single_with::<f32>(kind, set);
     for (theta, phi) in PLACES {
         let result = chi2(&|w| stack.bsdf(w), around(theta, phi), 60_000, rng);
         let whole = pdf_integral(&stack, around(theta, phi));
@@ -103,7 +99,7 @@ fn samples_well(kind: LobeKind, set: &[(&str, f32)], rng: &mut Pcg64Mcg) {
 
 /// Variance of f·cos/pdf: uniform over the hemisphere, and by the lobe's own sampling.
 fn variances(kind: LobeKind, set: &[(&str, f32)], wo: [f32; 3], rng: &mut Pcg64Mcg) -> (f64, f64) {
-    let stack = stack(kind, set);
+    let stack = single_with::<f32>(kind, set);
     let bsdf = stack.bsdf(wo);
     let count = 200_000;
     let (mut own, mut uniform) = ([0.0f64; 2], [0.0f64; 2]);

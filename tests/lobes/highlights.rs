@@ -1,17 +1,11 @@
 //! Phong's and Ward's highlights: bounded at every width, tables true, samples as they say.
 #![cfg(feature = "legacy")]
 
-use crate::common::{Stack, alone, turned};
-use overcoat::albedo::Precision;
+use crate::common::{single_with, turned};
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::lobes::LobeKind;
-use overcoat::optics::Scalar;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-
-fn single<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Stack<S> {
-    Stack::new(alone(kind, set), Precision::STANDARD)
-}
 
 type Subject = (LobeKind, &'static [(&'static str, f32)]);
 const SUBJECTS: [Subject; 7] = [
@@ -28,7 +22,7 @@ const SUBJECTS: [Subject; 7] = [
 fn highlights_never_gain_and_their_tables_are_true() {
     let tolerance = Tolerance { error: 2e-5, evaluations: 60_000 };
     for (kind, set) in SUBJECTS {
-        let stack = single::<f64>(kind, set);
+        let stack = single_with::<f64>(kind, set);
         // Closer to the horizon the quadrature's own error, 9e-5 at 0.004, exceeds what is compared.
         for cos in [1.0, 0.7, 0.3, 0.05, 0.02] {
             let w = turned(cos).map(f64::from);
@@ -50,7 +44,7 @@ fn highlights_never_gain_and_their_tables_are_true() {
 fn highlights_are_sampled_as_they_say() {
     let mut rng = Pcg64Mcg::seed_from_u64(41);
     for (kind, set) in SUBJECTS {
-        let stack = single::<f32>(kind, set);
+        let stack = single_with::<f32>(kind, set);
         for cos in [1.0, 0.6, 0.1] {
             let result = chi2(&|w| stack.bsdf(w), turned(cos), 40_000, &mut rng);
             assert!(result.passes(1e-5), "{kind:?} {set:?} cos {cos}: {result:?}");

@@ -1,18 +1,14 @@
 //! Rough surfaces: nothing is lost at any roughness, from either medium, and smooth ones are the limit.
 #![cfg(feature = "microfacet")]
 
-use crate::common::{Stack, alone, block, turned};
+use crate::common::{Stack, block, single_with, turned};
 use overcoat::albedo::Precision;
 use overcoat::audit::{Side, Tolerance, albedo, chi2};
 use overcoat::closure::ClosureTree;
 use overcoat::lobes::LobeKind;
-use overcoat::optics::{Scalar, fresnel};
+use overcoat::optics::fresnel;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-
-fn single<S: Scalar>(kind: LobeKind, set: &[(&str, f32)]) -> Stack<S> {
-    Stack::new(alone(kind, set), Precision::STANDARD)
-}
 
 /// What 40 000 samples carry on average: an estimate of the albedo that needs no grid, to about 0.004.
 fn sampled(stack: &Stack<f64>, cos: f64) -> f64 {
@@ -31,7 +27,7 @@ fn a_white_surface_stays_white() {
     for shape in [0.0, 1.0] {
         for alpha in [(1e-4, 1e-4), (0.01, 0.01), (0.1, 0.1), (0.5, 0.5), (1.0, 1.0), (0.05, 0.4)] {
             let set = [("distribution", shape), ("xalpha", alpha.0), ("yalpha", alpha.1), ("eta", 0.0)];
-            let stack = single::<f64>(LobeKind::Microfacet, &set);
+            let stack = single_with::<f64>(LobeKind::Microfacet, &set);
             for cos in COSINES {
                 for side in [Side::View, Side::Light] {
                     let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
@@ -50,7 +46,7 @@ fn glass_divides_all_light_between_reflection_and_refraction() {
     let surfaces = [(1e-4, 1.5), (0.05, 1.5), (0.3, 1.33), (0.3, 2.4), (1.0, 1.5), (0.5, 0.7), (0.3, 0.5)];
     for (k, (alpha, ior)) in surfaces.into_iter().enumerate() {
         let set = [("roughness_x", alpha), ("roughness_y", alpha), ("ior", ior), ("distribution", (k % 2) as f32)];
-        let stack = single::<f64>(LobeKind::Dielectric, &set);
+        let stack = single_with::<f64>(LobeKind::Dielectric, &set);
         for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
             for side in [Side::View, Side::Light] {
                 let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
@@ -76,7 +72,7 @@ fn thin_walls_divide_all_light() {
             ("thin_walled", 1.0),
             ("distribution", shape),
         ];
-        let stack = single::<f64>(LobeKind::Dielectric, &set);
+        let stack = single_with::<f64>(LobeKind::Dielectric, &set);
         for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -1.0] {
             for side in [Side::View, Side::Light] {
                 let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
@@ -105,7 +101,7 @@ fn a_colored_boundary_divides_all_light() {
             ("transmission_tint", 1.0),
             ("distribution", (k % 2) as f32),
         ];
-        let stack = single::<f64>(LobeKind::GeneralizedSchlick, &set);
+        let stack = single_with::<f64>(LobeKind::GeneralizedSchlick, &set);
         for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
             for side in [Side::View, Side::Light] {
                 let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
@@ -131,7 +127,7 @@ fn a_film_on_glass_divides_nearly_all_light() {
             ("thinfilm_ior", film),
             ("distribution", distribution),
         ];
-        let stack = single::<f64>(LobeKind::Dielectric, &set);
+        let stack = single_with::<f64>(LobeKind::Dielectric, &set);
         for cos in [1.0, 0.6, 0.2, 0.02, -0.02, -0.5, -0.8, -1.0] {
             for side in [Side::View, Side::Light] {
                 let e = albedo(&|w| stack.bsdf(w), side, turned(cos).map(f64::from), TOLERANCE);
@@ -182,8 +178,8 @@ fn a_smooth_thin_wall_is_a_window() {
     for cos in [1.0f64, 0.5, 0.1, -0.7] {
         let set = |tint| [("roughness_x", 1e-4), ("roughness_y", 1e-4), ("thin_walled", 1.0), tint];
         let w = turned(cos).map(f64::from);
-        let back = single::<f64>(LobeKind::Dielectric, &set(("transmission_tint", 0.0))).bsdf(w).albedo()[0];
-        let on = single::<f64>(LobeKind::Dielectric, &set(("reflection_tint", 0.0)));
+        let back = single_with::<f64>(LobeKind::Dielectric, &set(("transmission_tint", 0.0))).bsdf(w).albedo()[0];
+        let on = single_with::<f64>(LobeKind::Dielectric, &set(("reflection_tint", 0.0)));
         let r = fresnel::dielectric(1.25, cos.abs());
         assert!((back - 2.0 * r / (1.0 + r)).abs() < 1e-3, "cos {cos}: {back} for {r}");
         // Light goes through unbent, into the same medium.
@@ -199,7 +195,7 @@ fn samples_carry_what_the_tables_say() {
         for alpha in [1e-4, 0.02, 0.5] {
             let ior = if alpha > 0.1 { 0.7 } else { 1.5 };
             let set = [("distribution", shape), ("roughness_x", alpha), ("roughness_y", alpha), ("ior", ior)];
-            let stack = single::<f64>(LobeKind::Dielectric, &set);
+            let stack = single_with::<f64>(LobeKind::Dielectric, &set);
             for cos in [1.0, 0.6, 0.3, -0.8] {
                 let mean = sampled(&stack, cos);
                 println!("{set:?} cos {cos}: samples carry {mean:.4}");
@@ -215,9 +211,9 @@ fn smooth_surfaces_are_the_limit_of_rough_ones() {
         let w = turned(cos).map(f64::from);
         for refract in [0.0, 1.0] {
             let set = [("xalpha", 1e-4), ("yalpha", 1e-4), ("refract", refract)];
-            let rough = single::<f64>(LobeKind::Microfacet, &set);
+            let rough = single_with::<f64>(LobeKind::Microfacet, &set);
             let kind = if refract > 0.0 { LobeKind::Refraction } else { LobeKind::Reflection };
-            let smooth = single::<f64>(kind, &[]);
+            let smooth = single_with::<f64>(kind, &[]);
             let (a, b) = (rough.bsdf(w).albedo()[0], smooth.bsdf(w).albedo()[0]);
             assert!((a - b).abs() < 1e-3, "cos {cos} refract {refract}: {a} for {b}");
             // The peak lies where the delta lobe points.
@@ -241,7 +237,7 @@ fn narrow_lobes_are_sampled_as_they_say() {
         (LobeKind::Dielectric, vec![("roughness_x", 0.1), ("thin_walled", 1.0)]),
         (LobeKind::Conductor, vec![("roughness_x", 0.2)]),
     ] {
-        let stack = single::<f32>(kind, &set);
+        let stack = single_with::<f32>(kind, &set);
         for cos in [0.9, 0.2, -0.6] {
             let result = chi2(&|w| stack.bsdf(w), turned(cos), 40_000, &mut rng);
             assert!(result.passes(1e-5), "{kind:?} {set:?} cos {cos}: {result:?}");
@@ -252,7 +248,7 @@ fn narrow_lobes_are_sampled_as_they_say() {
 #[test]
 fn a_rough_metal_is_more_saturated_than_its_mirror() {
     let set = |alpha| [("roughness_x", alpha), ("roughness_y", alpha)];
-    let color = |alpha: f32| single::<f32>(LobeKind::Conductor, &set(alpha)).bsdf([0.0, 0.0, 1.0]).albedo();
+    let color = |alpha: f32| single_with::<f32>(LobeKind::Conductor, &set(alpha)).bsdf([0.0, 0.0, 1.0]).albedo();
     let (smooth, rough) = (color(0.001), color(1.0));
     let mirror = fresnel::conductor(0.183f32, 3.424, 1.0);
     assert!((smooth[0] - mirror).abs() < 2e-3, "{smooth:?}");

@@ -2,7 +2,7 @@
 //! uniform directions. Run with `--nocapture` for the tables.
 #![cfg(all(feature = "cloth", feature = "microfacet", feature = "legacy"))]
 
-use crate::common::{Stack, alone, at, block, lobe};
+use crate::common::{Stack, at, block, lobe, single_with};
 use overcoat::albedo::Precision;
 use overcoat::albedo::quadrature::Rule;
 use overcoat::audit::chi2;
@@ -12,6 +12,7 @@ use overcoat::lobes::registry::LobeClass;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const ROUGHNESS: [f64; 5] = [0.07, 0.15, 0.3, 0.6, 1.0];
 /// The normal, 37°, 60°, 78°, 85°, 89.5°.
@@ -31,8 +32,8 @@ const SUBJECTS: [Subject; 8] = [
     ("eon", LobeKind::Eon, &[], 0.2),
 ];
 
-fn stack(kind: LobeKind, set: &[(&str, f32)], r: f64) -> Stack<f32> {
-    Stack::new(alone(kind, &[set, &[("roughness", r as f32)]].concat()), Precision::STANDARD)
+fn stack(kind: LobeKind, set: &[(&str, f32)], r: f64) -> Arc<Stack<f32>> {
+    single_with(kind, &[set, &[("roughness", r as f32)]].concat())
 }
 
 /// Relative variances of f·cos/pdf for ωo at `cos`: with the lobe's own samples, and with uniform ones.

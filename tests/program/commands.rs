@@ -31,7 +31,8 @@ const BEGIN: [&str; 10] = [
 
 /// Who runs what is not run here: a file, and what stands in it.
 const ELSEWHERE: [(&str, &str, &str); 7] = [
-    ("cargo test", ".ci/run", "step cargo test\n"),
+    // All features: those by default and more.
+    ("cargo test", ".ci/run", "step cargo test --locked --all-features -- "),
     ("cargo bench --bench bsdf", "Cargo.toml", "[[bench]]\nname = \"bsdf\"\n"),
     ("cargo run --release -- studio examples", "tests/program/studio.rs", ".args([\"studio\", "),
     ("sh examples/c/run.sh", "tests/hosts/capi.rs", "examples/c/run.sh"),
@@ -152,7 +153,10 @@ fn commands_of_the_program_run() {
 
 fn example(folder: &Path, name: &str, arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO"));
-    command.args(["run", "--quiet", "--manifest-path"]).arg(root().join("Cargo.toml")).args(["--example", name, "--"]);
+    command.args(["run", "--quiet", "--manifest-path"]).arg(root().join("Cargo.toml"));
+    // As these tests were built, and the examples with them: other features would build the library anew.
+    command.args(cfg!(all(feature = "capi", feature = "proptest")).then_some("--all-features"));
+    command.args(["--example", name, "--"]);
     let output = command.args(arguments).current_dir(folder).output().expect("cargo starts");
     assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
