@@ -13,10 +13,11 @@
 //! channel that loses least has it; others may lose 0.3 %.
 
 use super::interface::{Interface, index};
+use super::lobe::apart;
 use super::pane::{self, Pane};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
-use super::{Evaluated, Lobe, Rgb, Sides, apart};
+use super::{Evaluated, Lobe, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3};

@@ -152,7 +152,8 @@ pub trait Lobe<S: Real>: Sized + Copy {
         S::one()
     }
 
-    /// For lobes of class [`LobeClass::Delta`]: the one direction they scatter to, and the part they scatter.
+    /// For lobes of class [`Delta`](super::registry::LobeClass::Delta): the one direction they scatter to, and the part they
+    /// scatter.
     fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
         None
     }

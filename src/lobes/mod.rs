@@ -75,8 +75,8 @@ pub mod ward;
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Over, Real, V3};
 use limits::{Limits, SlotRange};
+use lobe::albedos;
 pub use lobe::{Evaluated, Lobe, Sides};
-use lobe::{albedos, apart};
 use registry::{ClosureParams, LobeClass, LobeSpec};
 pub use signatures::forms;
 

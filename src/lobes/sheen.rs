@@ -26,10 +26,11 @@
 //! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/lobes/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
+use super::lobe::apart;
 use super::ltc::{self, Ltc};
 use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
-use super::{Evaluated, Lobe, LobeKind, Rgb, apart};
+use super::{Evaluated, Lobe, LobeKind, Rgb};
 use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, Cells, CurveSpec};
 use crate::optics::{Over, Real, Scalar, V3};
