@@ -55,7 +55,7 @@ pub fn chi2<'m, S: Scalar>(subject: &impl Subject<'m, S>, wo: [S; 3], count: usi
             delta += 1.0;
             continue;
         }
-        let again = bsdf.eval(sample.wi).pdf.to_f64();
+        let again = bsdf.pdf(sample.wi).to_f64();
         mismatch = mismatch.max((again / sample.pdf.to_f64() - 1.0).abs());
         let [x, y, z] = sample.wi.map(S::to_f64);
         let row = ((z * 0.5 + 0.5) * ROWS as f64).clamp(0.0, ROWS as f64 - 1.0) as usize;
@@ -78,7 +78,7 @@ pub fn chi2<'m, S: Scalar>(subject: &impl Subject<'m, S>, wo: [S; 3], count: usi
         let integral = integrate(&split_at(&[corners], &places[bin], PLACES / 8), tolerance, |z, phi| {
             let sin = (1.0 - z * z).max(0.0).sqrt();
             let wi = [sin * phi.cos(), sin * phi.sin(), z].map(S::c);
-            [bsdf.eval(wi).pdf.to_f64(), 0.0, 0.0]
+            [bsdf.pdf(wi).to_f64(), 0.0, 0.0]
         });
         integral.value[0]
     };

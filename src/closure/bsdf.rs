@@ -574,12 +574,12 @@ pub(super) fn unit_or_zero<L: Real>(w: V3<L>) -> V3<L> {
 
 /// Whether a direction is finite and about as long as it should be.
 #[inline(always)]
-fn is_unit<L: Real>(w: V3<L>) -> L::Mask {
+pub(super) fn is_unit<L: Real>(w: V3<L>) -> L::Mask {
     let length = w.length_squared();
     length.gt(L::c(0.25)) & length.lt(L::c(4.0))
 }
 
 #[inline(always)]
-fn vector<S: Real>(w: [S; 3]) -> V3<S> {
+pub(super) fn vector<S: Real>(w: [S; 3]) -> V3<S> {
     V3::new(w[0], w[1], w[2])
 }

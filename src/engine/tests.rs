@@ -25,6 +25,9 @@ fn lanes_of_any_processor_give_what_single_calls_give() {
             let globals = Globals { u: 0.3, ..Globals::default() };
             let bsdf = material.shade(&globals, glam::vec3(0.48, 0.36, 0.8)).expect("small");
             let single: Vec<Eval> = wi.iter().map(|w| bsdf.eval(*w)).collect();
+            for (w, e) in wi.iter().zip(&single) {
+                assert_eq!(bsdf.pdf(*w).to_bits(), e.pdf.to_bits(), "{script} {w:?}");
+            }
             for count in [8, 13, 64, wi.len()] {
                 let black = Eval { f_cos: [-1.0; 3], pdf: -1.0 };
                 let (mut portable, mut widest) = (vec![black; count], vec![black; count]);

@@ -81,7 +81,7 @@ fn pdf_integral(stack: &Stack<f32>, wo: [f32; 3]) -> f64 {
         let theta = ((row as f64 + 0.5) / rows as f64 - 0.5) * 180.0;
         for column in 0..columns {
             let phi = ((column as f64 + 0.5) / columns as f64 - 0.5) * 180.0;
-            sum += bsdf.eval(around(theta, phi)).pdf as f64 * theta.to_radians().cos();
+            sum += bsdf.pdf(around(theta, phi)) as f64 * theta.to_radians().cos();
         }
     }
     sum * (std::f64::consts::PI / rows as f64) * (std::f64::consts::PI / columns as f64)
