@@ -177,6 +177,12 @@ pub(crate) fn read_viewer<L: Real>(cells: &Cells, cos: L) -> Option<(L, L)> {
     Some((octaves::cubic([a, b, c, d], t), octaves::cubic([e, f, g, h], t)))
 }
 
+/// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
+#[inline(always)]
+pub(super) fn visibility<L: Real>(cos_o: L, cos_i: L) -> L {
+    L::c(0.25) / (cos_o + cos_i - cos_o * cos_i).max(L::c(1e-30))
+}
+
 /// The lowest roughness the series of the exact Λ covers.
 pub const MIN_ROUGHNESS: f64 = 0.001;
 /// Terms of the series over the cosine.

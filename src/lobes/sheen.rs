@@ -367,7 +367,7 @@ impl<S: Real> Sheen<S> {
 
     #[inline(always)]
     fn visible<L: Over<S>>(&self, wi: V3<L>, d: L) -> L {
-        self.above(wi, d * visibility(L::lift(self.wo.z), wi.z))
+        self.above(wi, d * charlie::visibility(L::lift(self.wo.z), wi.z))
     }
 
     #[inline(always)]
@@ -443,12 +443,6 @@ impl<'a, E: Scalar> Known<'a, E> {
         let [terms, row] = curve.extra();
         Known { terms, row, cells: curve.cells() }
     }
-}
-
-/// Narkowicz's G/(4·μo·μi) = 1/(4(μo + μi − μo·μi)), after Neubelt & Pettineo 2013.
-#[inline(always)]
-pub(super) fn visibility<L: Real>(cos_o: L, cos_i: L) -> L {
-    L::c(0.25) / (cos_o + cos_i - cos_o * cos_i).max(L::c(1e-30))
 }
 
 #[inline(always)]

@@ -11,7 +11,7 @@
 use super::ltc::Ltc;
 use super::ltc_tables::VELVET;
 use super::registry::{ClosureParams, closure};
-use super::{Lobe, Rgb, charlie, sheen};
+use super::{Lobe, Rgb, charlie};
 use crate::albedo::curve::{no_cells, no_extra};
 use crate::albedo::{AlbedoCurve, Axis, CurveSpec};
 use crate::optics::{Over, Real, V3};
@@ -61,7 +61,7 @@ impl<S: Real> Velvet<S> {
         // 1/sin⁴ = (1 + cot²)²; the exponential has long vanished at the cap.
         let cot2 = charlie::half_cot2(wo, wi).min(L::c(1e6));
         let rim = L::c(4.0) * (-cot2 * L::lift(self.inv_m2)).exp() * (L::one() + cot2).sq();
-        let f = L::lift(self.scale) * (L::one() + rim) * sheen::visibility(wo.z, wi.z);
+        let f = L::lift(self.scale) * (L::one() + rim) * charlie::visibility(wo.z, wi.z);
         L::select(wi.z.gt(L::zero()), f, L::zero())
     }
 
