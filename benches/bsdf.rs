@@ -35,7 +35,7 @@ fn eval(bencher: Bencher, name: &str) {
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     bencher.counter(ItemsCount::new(wi.len())).bench_local(|| {
         for w in &wi {
-            black_box(bsdf.eval(*black_box(w)));
+            black_box(&bsdf.eval(*black_box(w)));
         }
     });
 }
@@ -54,7 +54,7 @@ fn sample(bencher: Bencher, name: &str) {
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     bencher.counter(ItemsCount::new(u.len())).bench_local(|| {
         for u in &u {
-            black_box(bsdf.sample(*black_box(u)));
+            black_box(&bsdf.sample(*black_box(u)));
         }
     });
 }

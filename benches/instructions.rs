@@ -81,10 +81,10 @@ fn run(stack: &str) {
             black_box(bsdf.is_ok());
         });
         counted(TIMES, &mut |k| {
-            black_box(bsdf.eval(*black_box(&wi[k])));
+            black_box(&bsdf.eval(*black_box(&wi[k])));
         });
         counted(TIMES, &mut |k| {
-            black_box(bsdf.sample(*black_box(&u[k])));
+            black_box(&bsdf.sample(*black_box(&u[k])));
         });
     }
     // At the end: valgrind does not know all instructions of vector code.

@@ -44,7 +44,7 @@ fn evals(material: &Material) -> Work<'_> {
     let bsdf = material.shade(&globals, WO.into()).expect("shades");
     Box::new(move || {
         for w in &wi {
-            black_box(bsdf.eval(*black_box(w)));
+            black_box(&bsdf.eval(*black_box(w)));
         }
         wi.len()
     })

@@ -1,4 +1,4 @@
-//! Shading up to eight lobes, and evaluating and sampling any number, leave the heap alone.
+//! Shading up to eight lobes, and evaluating and sampling any number, leave the heap alone; three lobes are small.
 #![cfg(feature = "cloth")]
 #![allow(unsafe_code)]
 
@@ -82,5 +82,28 @@ fn batches_leave_the_heap_alone_once_they_have_grown() {
             }
         });
         assert_eq!(count, 0, "{script}");
+    }
+}
+
+/// Where the material is the same at every point.
+#[cfg(feature = "microfacet")]
+#[test]
+fn a_bsdf_of_three_lobes_takes_half_a_kilobyte() {
+    let middles = [
+        r#"dielectric_bsdf(N, dPdu, 1, 1, 0.3, 0.3, 1.5, "ggx")"#,
+        r#"conductor_bsdf(N, dPdu, 0.2, 0.3, color(1.2), color(3.9), "ggx")"#,
+        r#"microfacet("beckmann", N, dPdu, 0.2, 0.3, 0, 0)"#,
+        "eon(N, color(0.8), 0.5)",
+        "velvet(N, 0.3)",
+        "thread(N, dPdu, color(0.5, 0.1, 0.1), 1.46, 0.3, 12, 24)",
+        r#"microcylinder(N, dPdu, "linen")"#,
+    ];
+    for middle in middles {
+        let text = format!("Ci = sheen(layer(0.5 * {middle}, oren_nayar(N, 0.4)), N, 0.5, 0.3);");
+        let material = Engine::new().material(middle, &text).expect("compiles");
+        let bsdf = material.shade(&Globals::default(), glam::Vec3::new(0.6, 0.0, 0.8)).expect("small");
+        println!("{middle}: {} bytes", bsdf.bytes());
+        assert_eq!(bsdf.lobe_count(), 3);
+        assert!(bsdf.bytes() <= 512, "{middle}: {} bytes", bsdf.bytes());
     }
 }

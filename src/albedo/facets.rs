@@ -12,7 +12,7 @@ use super::curve::Precision;
 use super::fill::{Estimate, fill};
 use super::quadrature::Rule;
 use super::visible::FacetQuadrature;
-use crate::optics::{Over, Real, Scalar, V3, lifted};
+use crate::optics::{Lift, Over, Real, Scalar, V3, lifted};
 use std::f64::consts::FRAC_2_PI;
 
 /// What the rows of a table go over.
@@ -38,9 +38,36 @@ pub struct FacetTables<S> {
     rows: usize,
     nodes: usize,
     parts: usize,
+    steps: Steps<S>,
 }
 
-impl<S> Default for FacetTables<S> {
+/// Whole numbers that say where in a table to read, as numbers of the kind that is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Steps<S> {
+    /// Cells over the cosine and the last of them, the same over the rows.
+    cells: S,
+    last: S,
+    row_cells: S,
+    last_row: S,
+    /// Entries of a row, and of the sheet above.
+    row: S,
+    sheet: S,
+}
+
+impl<S: Real> Steps<S> {
+    fn new(sheets: usize, rows: usize, nodes: usize) -> Self {
+        Steps {
+            cells: count(nodes.max(1) - 1),
+            last: count(nodes.max(2) - 2),
+            row_cells: count(rows.max(1) - 1),
+            last_row: count(rows.max(2) - 2),
+            row: count(nodes),
+            sheet: count((sheets - 1) * rows * nodes),
+        }
+    }
+}
+
+impl<S: Real> Default for FacetTables<S> {
     fn default() -> Self {
         FacetTables {
             missing: vec![],
@@ -52,16 +79,18 @@ impl<S> Default for FacetTables<S> {
             rows: 1,
             nodes: 0,
             parts: 0,
+            steps: Steps::new(1, 1, 0),
         }
     }
 }
 
-/// Where in a table to read.
+/// Where in a table to read for a direction.
 #[derive(Clone, Copy, Debug)]
-struct Place<L> {
+pub struct FacetPlace<L: Real> {
     start: L,
     across: L,
     row: L,
+    lit: L::Mask,
 }
 
 impl<S: Scalar> FacetTables<S> {
@@ -79,18 +108,23 @@ impl<S: Scalar> FacetTables<S> {
     /// the widths at this point.
     #[inline(always)]
     pub fn missing<A: Real<Entry = S>, L: Over<A>>(&self, w: V3<L>, alpha: [A; 2]) -> L {
+        self.missing_at(&self.place(w, alpha[0]), alpha)
+    }
+
+    /// [`missing`](Self::missing) where it is known where to read.
+    #[inline(always)]
+    pub fn missing_at<A: Real<Entry = S>, L: Over<A>>(&self, place: &FacetPlace<L>, alpha: [A; 2]) -> L {
         if self.is_empty() {
             return L::zero();
         }
-        let missing = self.read(&self.missing, 0, self.place(w, alpha[0]));
-        let missing = match self.kind {
+        let missing = self.read(&self.missing, 0, place);
+        match self.kind {
             Rows::Alpha => {
                 let [x, y] = lifted::<_, L, 2>(alpha);
                 L::select(x.lt(y) | y.lt(x), L::zero(), missing)
             }
             _ => missing,
-        };
-        self.lit(w, missing)
+        }
     }
 
     /// Mean of M over the hemisphere above (or below), weighted with μ/π.
@@ -110,13 +144,25 @@ impl<S: Scalar> FacetTables<S> {
     /// Albedo of each part; 0 where `missing` is.
     #[inline(always)]
     pub fn view<L: Over<S>>(&self, w: V3<L>) -> [L; PARTS] {
-        self.parts_of(&self.view, w)
+        self.parts_at(&self.view, &self.place(w, S::zero()))
     }
 
     /// Never below the albedo of each part.
     #[inline(always)]
     pub fn bound<L: Over<S>>(&self, w: V3<L>) -> [L; PARTS] {
-        self.parts_of(&self.bound, w)
+        self.parts_at(&self.bound, &self.place(w, S::zero()))
+    }
+
+    /// [`view`](Self::view) of the first `N` parts where it is known where to read.
+    #[inline(always)]
+    pub fn view_at<L: Real<Entry = S>, const N: usize>(&self, place: &FacetPlace<L>) -> [L; N] {
+        self.parts_at(&self.view, place)
+    }
+
+    /// [`bound`](Self::bound) of the first `N` parts where it is known where to read.
+    #[inline(always)]
+    pub fn bound_at<L: Real<Entry = S>, const N: usize>(&self, place: &FacetPlace<L>) -> [L; N] {
+        self.parts_at(&self.bound, place)
     }
 
     /// Memory the tables take.
@@ -124,54 +170,58 @@ impl<S: Scalar> FacetTables<S> {
         (self.missing.len() + self.view.len() + self.bound.len() + self.means.len()) * size_of::<S>()
     }
 
+    /// Parts are there only where the widths do not vary.
     #[inline(always)]
-    fn parts_of<L: Over<S>>(&self, table: &[S], w: V3<L>) -> [L; PARTS] {
-        let mut result = [L::zero(); PARTS];
-        if self.parts > 0 {
-            // Parts are there only where the widths do not vary.
-            let place = self.place(w, S::zero());
-            for (part, result) in result.iter_mut().enumerate().take(self.parts) {
-                *result = self.lit(w, self.read(table, part, place));
-            }
+    fn parts_at<L: Real<Entry = S>, const N: usize>(&self, table: &[S], place: &FacetPlace<L>) -> [L; N] {
+        let mut parts = [L::zero(); N];
+        for (part, value) in parts.iter_mut().enumerate().take(self.parts) {
+            *value = self.read(table, part, place);
         }
-        result
+        parts
     }
 
+    /// Where to read for a direction; `width` is the one that rows may go over.
     #[inline(always)]
-    fn lit<L: Real>(&self, w: V3<L>, value: L) -> L {
-        let cos = if self.sheets == 2 { w.z.abs() } else { w.z };
-        L::select(cos.gt(L::zero()), value, L::zero())
-    }
-
-    #[inline(always)]
-    fn place<A: Real<Entry = S>, L: Over<A>>(&self, w: V3<L>, width: A) -> Place<L> {
-        let last = |n: usize| count::<L>(n.max(2) - 2);
-        let x = w.z.abs().min(L::one()).sqrt().sqrt() * count::<L>(self.nodes - 1);
-        let i = x.whole().min(last(self.nodes));
+    pub fn place<A: Real<Entry = S>, L: Over<A>>(&self, w: V3<L>, width: A) -> FacetPlace<L> {
+        let steps = &self.steps;
+        let x = w.z.abs().min(L::one()).sqrt().sqrt() * <L as Lift<S>>::lift(steps.cells);
+        let i = x.whole().min(<L as Lift<S>>::lift(steps.last));
+        let (mut start, mut cos) = (i, w.z);
+        if self.sheets == 2 {
+            cos = cos.abs();
+            start += L::select(w.z.lt(L::zero()), <L as Lift<S>>::lift(steps.sheet), L::zero());
+        }
+        let (across, lit) = (x - i, cos.gt(L::zero()));
         let row = match self.kind {
-            Rows::One => L::zero(),
+            Rows::One => return FacetPlace { start, across, row: L::zero(), lit },
             Rows::Azimuth(roots) => {
-                let (x, y) = (w.x.abs() * L::lift(roots[0]), w.y.abs() * L::lift(roots[1]));
+                let (x, y) = (w.x.abs() * <L as Lift<S>>::lift(roots[0]), w.y.abs() * <L as Lift<S>>::lift(roots[1]));
                 (y / (x + y).max(L::c(1e-30))).min(L::one())
             }
             Rows::Alpha => L::lift(alpha_row(width)),
         };
-        let row = row * count::<L>(self.rows - 1);
-        let j = row.whole().min(last(self.rows));
-        let below = count::<L>((self.sheets - 1) * self.rows * self.nodes);
-        let sheet = L::select(w.z.lt(L::zero()), below, L::zero());
-        Place { start: sheet + j.mul_add(count::<L>(self.nodes), i), across: x - i, row: row - j }
+        let row = row * <L as Lift<S>>::lift(steps.row_cells);
+        let j = row.whole().min(<L as Lift<S>>::lift(steps.last_row));
+        FacetPlace { start: j.mul_add(<L as Lift<S>>::lift(steps.row), start), across, row: row - j, lit }
     }
 
+    /// 0 in the surface, and below one that does not transmit.
     #[inline(always)]
-    fn read<L: Over<S>>(&self, table: &[S], part: usize, place: Place<L>) -> L {
-        let start = place.start + count::<L>(part * self.sheets * self.rows * self.nodes);
+    fn read<L: Real<Entry = S>>(&self, table: &[S], part: usize, place: &FacetPlace<L>) -> L {
+        let start = match part {
+            0 => place.start,
+            _ => place.start + count::<L>(part * self.sheets * self.rows * self.nodes),
+        };
         let low = L::between(table, start, place.across);
-        if self.rows == 1 {
-            return low;
-        }
-        let high = L::between(table, start + count::<L>(self.nodes), place.across);
-        (high - low).mul_add(place.row, low)
+        let value = match self.kind {
+            Rows::One => low,
+            _ => {
+                let row = <L as Lift<S>>::lift(self.steps.row);
+                let high = L::between(table, start + row, place.across);
+                (high - low).mul_add(place.row, low)
+            }
+        };
+        L::select(place.lit, value, L::zero())
     }
 }
 
@@ -192,6 +242,7 @@ impl<S: Scalar> FacetTables<S> {
             rows: self.rows,
             nodes: self.nodes,
             parts: self.parts,
+            steps: Steps::new(self.sheets, self.rows, self.nodes),
         }
     }
 
@@ -273,6 +324,7 @@ impl FacetSpec {
             rows,
             nodes,
             parts,
+            steps: Steps::new(sheets, rows, nodes),
         };
         let lifts = grid.shortfalls(&tables, &fine);
         for (k, lift) in lifts.iter().enumerate() {

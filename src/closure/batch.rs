@@ -3,12 +3,13 @@
 //! Each lobe is gone to once for up to [`BLOCKS`] eights, so that what it is and what it holds is looked up once, and one
 //! eight's arithmetic goes on while another's waits. What goes from lobe to lobe is kept per eight.
 
-use super::bsdf::{Bsdf, Eval, FlatLobe, LayerAlpha, Op, add, finite, unit_or_zero};
+use super::bsdf::{Bsdf, Eval, Op, add, finite, unit_or_zero};
 use super::flatten::Layering;
 use super::layer::{FlatStack, LayerStack, TintRule};
+use super::met::{LayerAlpha, Met};
 use crate::albedo::AlbedoCurve;
-use crate::lobes::host::Host;
-use crate::lobes::{Evaluated, Listed, Lobe, LobeVisitor};
+use crate::lobes::host::{Host, HostSeen};
+use crate::lobes::{AnyLobe, Evaluated, Listed, Lobe, LobeVisitor, host_again};
 use crate::optics::{F32x8, Lanes, Lift, V3, array, dispatch};
 
 /// How many layers may be open at once for directions to be worked on side by side.
@@ -108,12 +109,12 @@ impl<L: Lanes> Block<L> {
 /// Adds up every lobe.
 #[inline(always)]
 fn evaluate<L: Lanes>(bsdf: &Bsdf<'_>, blocks: &mut [Block<L>]) {
-    let (lobes, frames, rule) = (&*bsdf.lobes, &*bsdf.frames, bsdf.layering.rule);
+    let (frames, rule) = (&*bsdf.frames, bsdf.layering.rule);
     let mut deep = if bsdf.is_flat() { None } else { Some(Deep::new(bsdf)) };
     let mut frame = u32::MAX;
-    for (index, l) in lobes.iter().enumerate() {
-        if l.frame != frame {
-            frame = l.frame;
+    for (index, l) in bsdf.met().enumerate() {
+        if l.place.frame != frame {
+            frame = l.place.frame;
             for block in &mut *blocks {
                 block.local = frames[frame as usize].to_local(block.wi);
             }
@@ -121,12 +122,13 @@ fn evaluate<L: Lanes>(bsdf: &Bsdf<'_>, blocks: &mut [Block<L>]) {
         match &mut deep {
             None => {
                 for block in &mut *blocks {
-                    block.scale = block.stack.step(l.steps, rule, <L as Lift<f32>>::lift(l.alpha_o));
+                    block.scale = block.stack.step(l.place.steps, rule, <L as Lift<f32>>::lift(l.flat.alpha_o));
                 }
             }
-            Some(deep) => deep.go_on(blocks),
+            Some(deep) => deep.go_on(blocks, index),
         }
-        l.lobe.visit(Visit { bsdf, index, l, blocks: &mut *blocks, stacks: deep.as_mut().map(|d| &mut d.stacks) });
+        let stacks = deep.as_mut().map(|d| &mut d.stacks);
+        l.flat.lobe.visit(Visit { bsdf, index, l, blocks: &mut *blocks, stacks });
     }
 }
 
@@ -134,7 +136,7 @@ fn evaluate<L: Lanes>(bsdf: &Bsdf<'_>, blocks: &mut [Block<L>]) {
 struct Visit<'a, 'm, L: Lanes> {
     bsdf: &'a Bsdf<'m>,
     index: usize,
-    l: &'a FlatLobe<'m, f32>,
+    l: Met<'a, 'm, f32>,
     blocks: &'a mut [Block<L>],
     /// Of a tree that is not flat.
     stacks: Option<&'a mut [Stack<L>; BLOCKS]>,
@@ -149,14 +151,14 @@ impl<L: Lanes> Visit<'_, '_, L> {
             let local = block.local;
             let e = lobe.toward(local);
             match balanced {
-                Some(balanced) => add(&mut block.sum, l, balanced.scale(local.z), local.z, &e),
+                Some(balanced) => add(&mut block.sum, &l.flat.share, balanced.scale(local.z), local.z, &e),
                 // Each channel alike: the compiler is told.
-                None => add(&mut block.sum, l, [block.scale; 3], local.z, &e),
+                None => add(&mut block.sum, &l.flat.share, [block.scale; 3], local.z, &e),
             }
-            if l.in_top {
-                let [r, g, b, _] = l.weight_in_top;
+            if l.place.in_top {
+                let [r, g, b, _] = l.place.weight_in_top;
                 match &mut stacks {
-                    None => block.stack.lobe(l.weight_in_top, e.bound),
+                    None => block.stack.lobe(l.place.weight_in_top, e.bound),
                     Some(stacks) => stacks[k].lobe([r, g, b], e.bound),
                 }
             }
@@ -169,17 +171,18 @@ trait Evaluate<L> {
     fn toward(&self, wi: V3<L>) -> Evaluated<L>;
 }
 
-/// A lobe of the list, its table and whether its bound is asked for.
-struct AtCurve<'a, B> {
-    lobe: &'a B,
+/// A lobe of the list as it is kept, with its rest, its table and whether its bound is asked for.
+struct AtCurve<'a, B: Lobe<f32>> {
+    kept: &'a B::Aimed,
+    rest: Option<&'a AnyLobe<f32>>,
     curve: &'a AlbedoCurve<f32>,
     bound: bool,
 }
 
-impl<L: Lanes, B: Lobe<f32>> Evaluate<L> for AtCurve<'_, B> {
+impl<L: Lanes, B: Listed<f32>> Evaluate<L> for AtCurve<'_, B> {
     #[inline(always)]
     fn toward(&self, wi: V3<L>) -> Evaluated<L> {
-        self.lobe.evaluate(wi, self.curve, self.bound)
+        B::evaluate_kept(self.kept, || self.rest.and_then(B::listed), wi, self.curve, self.bound)
     }
 }
 
@@ -207,14 +210,16 @@ impl<L: Lanes, B: Evaluate<L>> dispatch::Work for Added<'_, '_, L, B> {
 
 impl<L: Lanes> LobeVisitor<f32> for Visit<'_, '_, L> {
     #[inline(always)]
-    fn scattering<B: Lobe<f32> + Listed<f32>>(self, lobe: &B) {
-        let (curve, bound) = (self.l.curve, self.l.in_top);
-        L::apart(Added { visit: self, lobe: AtCurve { lobe, curve, bound } });
+    fn scattering<B: Listed<f32>>(self) {
+        let (curve, bound, rest) = (self.l.curve(), self.l.place.in_top, self.l.rest());
+        let Some(kept) = B::kept(&self.l.flat.lobe) else { return };
+        L::apart(Added { visit: self, lobe: AtCurve::<B> { kept, rest, curve, bound } });
     }
 
     #[inline(always)]
-    fn host(self, lobe: &Host<f32>) {
-        L::apart(Added { visit: self, lobe });
+    fn host(self, kept: &HostSeen<f32>) {
+        let Some(lobe) = host_again(kept, || self.l.rest()) else { return };
+        L::apart(Added { visit: self, lobe: &lobe });
     }
 }
 
@@ -234,9 +239,9 @@ impl<'a, 'm, L: Lanes> Deep<'a, 'm, L> {
         Deep { bsdf, next: 0, layer: 0, stacks: [LayerStack::default(); BLOCKS] }
     }
 
-    /// Goes on to the next lobe, and leaves what the layers above it scale it by.
+    /// Goes on to the next lobe, which is `lobe`, and leaves what the layers above it scale it by.
     #[inline(always)]
-    fn go_on(&mut self, blocks: &mut [Block<L>]) {
+    fn go_on(&mut self, blocks: &mut [Block<L>], lobe: usize) {
         let bsdf = self.bsdf;
         let stacks = &mut self.stacks[..blocks.len()];
         for op in &bsdf.ops()[self.next..] {
@@ -245,7 +250,7 @@ impl<'a, 'm, L: Lanes> Deep<'a, 'm, L> {
                 Op::Lobe => break,
                 Op::Begin => stacks.iter_mut().for_each(LayerStack::begin),
                 Op::Middle => {
-                    let LayerAlpha { alpha_o, weight } = bsdf.layers[self.layer];
+                    let LayerAlpha { alpha_o, weight } = bsdf.layer(self.layer, lobe);
                     let Layering { rule, tint } = bsdf.layering;
                     self.layer += 1;
                     for stack in &mut *stacks {

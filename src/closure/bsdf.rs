@@ -6,11 +6,12 @@
 use super::balance::Balanced;
 use super::flatten::Layering;
 use super::layer::{FlatStack, LayerStack, LayeringRule, TintRule};
+use super::met::{FlatLobe, LayerAlpha, Lists, Met, Place};
 use super::parts::{Cosine, Signal};
+use super::plan::Plan;
 use super::tree::MAX_LAYERS;
-use crate::albedo::AlbedoCurve;
-use crate::lobes::{AnyLobe, Evaluated, Rgb};
-use crate::optics::{Frame, Over, Real, Scalar, V3, array, rgb};
+use crate::lobes::{AimedLobe, AnyLobe, Evaluated, Rgb};
+use crate::optics::{Frame, Over, Real, Scalar, V3, array};
 use smallvec::SmallVec;
 
 /// f·|cos| per channel and the density of sampling that direction.
@@ -54,45 +55,6 @@ pub struct SampleFlags {
     pub subsurface: bool,
 }
 
-/// One lobe of a flattened tree.
-#[derive(Clone, Debug)]
-pub(crate) struct FlatLobe<'m, S: Real> {
-    /// Its weight from the root of the tree, per channel; then its probability of being chosen by `sample`. In one, because
-    /// f and pdf are worked out side by side.
-    pub share: [S; 4],
-    pub lobe: AnyLobe<S>,
-    pub curve: &'m AlbedoCurve<S::Entry>,
-    pub site: u32,
-    pub frame: u32,
-    /// From the root of the innermost top; the fourth is idle.
-    pub weight_in_top: [S; 4],
-    /// α toward ωo of the layer that dims it, where `steps` says that its base begins.
-    pub alpha_o: S,
-    /// What [`FlatStack`] is to do first.
-    pub steps: u8,
-    /// It stands in a top.
-    pub inside: bool,
-    /// It does, and its bound is needed for every ωi.
-    pub in_top: bool,
-    pub delta: bool,
-    /// What it is estimated to scatter for this ωo, weights and layers included.
-    pub albedo: Rgb<S>,
-}
-
-impl<S: Real> FlatLobe<'_, S> {
-    /// Of being chosen by `sample`.
-    pub fn probability(&self) -> S {
-        self.share[3]
-    }
-}
-
-/// A layer's α toward ωo and its weight relative to the top it stands in.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LayerAlpha<S> {
-    pub alpha_o: Rgb<S>,
-    pub weight: Rgb<S>,
-}
-
 /// The tree written out, top before base. Lobes and layers are stored in the order they are met.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Op {
@@ -109,21 +71,27 @@ pub(crate) enum Op {
 pub struct Bsdf<'m, S: Real = f32> {
     pub(crate) wo: V3<S>,
     /// As given, of any length.
-    pub(super) ng: V3<S>,
+    ng: V3<S>,
+    /// 1 where ωo is on its side, −1 on the other; 0 where there are no sides.
+    side: S,
     pub(crate) layering: Layering,
     /// The most layers open at once.
     pub(super) depth: u16,
-    /// Whether [`FlatStack`] will do for its layers, as far as the tree goes.
+    /// See [`is_flat`](Self::is_flat).
     pub(super) flat: bool,
-    pub(crate) ops: SmallVec<[Op; 32]>,
-    /// Whether there may be anything in what plans never fill: ops, balances, emission, signals.
+    /// What is the same at every point, of a tree that was written out before; in its place `ops`, `places`, `rests` and
+    /// `layers`.
+    pub(super) plan: Option<&'m Plan<S::Entry>>,
+    /// Whether there may be anything in what plans never fill: these, balances, emission, signals.
     pub(super) filled: bool,
-    /// In place of them, for a tree that was written out before.
-    pub(super) planned_ops: &'m [Op],
+    pub(super) ops: SmallVec<[Op; 32]>,
+    pub(super) places: SmallVec<[Place<S::Entry>; 8]>,
+    /// See [`Place::rest`].
+    pub(super) rests: SmallVec<[AnyLobe<S>; 8]>,
     pub(crate) lobes: SmallVec<[FlatLobe<'m, S>; 8]>,
     /// What scales each lobe in place of the layers' own rule, if that was solved for; empty where nothing was.
     pub(super) balanced: SmallVec<[Option<Balanced<'m, S>>; 8]>,
-    pub(crate) layers: SmallVec<[LayerAlpha<S>; 7]>,
+    pub(super) layers: SmallVec<[LayerAlpha<S>; 7]>,
     /// One for all lobes that share a normal and a tangent.
     pub(crate) frames: SmallVec<[Frame<S>; 8]>,
     pub(crate) emission: Rgb<S>,
@@ -137,12 +105,15 @@ impl<'m, S: Real> Bsdf<'m, S> {
         Bsdf {
             wo: zero,
             ng: zero,
+            side: S::zero(),
             layering: Layering::default(),
             depth: 0,
             flat: true,
-            ops: SmallVec::new(),
+            plan: None,
             filled: false,
-            planned_ops: &[],
+            ops: SmallVec::new(),
+            places: SmallVec::new(),
+            rests: SmallVec::new(),
             lobes: SmallVec::new(),
             balanced: SmallVec::new(),
             layers: SmallVec::new(),
@@ -154,11 +125,12 @@ impl<'m, S: Real> Bsdf<'m, S> {
 
     /// Black again for another point, keeping what memory there is.
     pub(super) fn reset(&mut self, wo: V3<S>, ng: V3<S>, layering: Layering, depth: u16) {
+        let (o, zero) = (ng.dot(wo), S::zero());
+        self.side = S::select(o.gt(zero), S::one(), S::select(o.lt(zero), -S::one(), zero));
         (self.wo, self.ng, self.layering, self.depth) = (wo, ng, layering, depth);
         self.flat = true;
-        self.planned_ops = &[];
+        self.plan = None;
         empty(&mut self.lobes);
-        empty(&mut self.layers);
         empty(&mut self.frames);
         if self.filled {
             self.filled = false;
@@ -170,6 +142,9 @@ impl<'m, S: Real> Bsdf<'m, S> {
     #[inline(never)]
     fn empty_more(&mut self) {
         empty(&mut self.ops);
+        empty(&mut self.places);
+        empty(&mut self.rests);
+        empty(&mut self.layers);
         empty(&mut self.balanced);
         self.emission = [S::zero(); 3];
         empty(&mut self.signals);
@@ -177,7 +152,19 @@ impl<'m, S: Real> Bsdf<'m, S> {
 
     /// The tree written out.
     pub(crate) fn ops(&self) -> &[Op] {
-        if self.planned_ops.is_empty() { &self.ops } else { self.planned_ops }
+        match self.plan {
+            Some(plan) => plan.ops(),
+            None => &self.ops,
+        }
+    }
+
+    /// Where each lobe stands.
+    #[inline(always)]
+    pub(crate) fn places(&self) -> &[Place<S::Entry>] {
+        match self.plan {
+            Some(plan) => plan.places(),
+            None => &self.places,
+        }
     }
 
     /// Turns estimated albedos, which add up to `total`, into probabilities and drops nothing.
@@ -192,8 +179,24 @@ impl<'m, S: Real> Bsdf<'m, S> {
 }
 
 impl<'m, S: Scalar> Bsdf<'m, S> {
+    #[inline(always)]
+    fn lists(&self) -> Lists<'_, 'm, S> {
+        Lists { places: self.places(), lobes: &self.lobes, frames: &self.frames, rests: &self.rests }
+    }
+
+    /// The lobes.
+    pub(crate) fn met(&self) -> impl ExactSizeIterator<Item = Met<'_, 'm, S>> {
+        self.lists().met()
+    }
+
+    /// One of them.
+    pub(crate) fn lobe(&self, index: usize) -> Met<'_, 'm, S> {
+        self.lists().lobe(index)
+    }
+
     /// What is left to do when the list is whole.
     pub(super) fn finish(&mut self) {
+        self.flat &= self.layering.tint == TintRule::Largest && self.balanced.is_empty();
         self.share_out(self.lobes.iter().fold(S::zero(), |sum, l| sum + l.share[3]));
         self.emission = self.emission.map(|e| e.min(S::c(1e30)));
         for s in &mut self.signals {
@@ -214,28 +217,23 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// [`eval`](Self::eval), the direction in registers: three numbers that a caller has just put down one by one cannot be
     /// picked up as two before they have arrived.
     fn eval_toward(&self, x: S, y: S, z: S) -> Eval<S> {
-        self.eval_own(V3::new(x, y, z), usize::MAX).0
-    }
-
-    /// [`eval`](Self::eval), and the density of lobe `own` alone (0 if there is none of that index).
-    #[inline(always)]
-    fn eval_own(&self, wi: V3<S>, own: usize) -> (Eval<S>, S) {
-        let mut sum = Sum { all: [S::zero(); 4], own, pdf: S::zero() };
+        let wi = V3::new(x, y, z);
+        let mut sum = Sum::new(usize::MAX);
         if is_unit(wi) {
             if self.is_flat() {
-                self.walk_flat(wi, &mut sum);
+                self.walk_flat(self.lists(), wi, &mut sum);
             } else {
-                self.eval_deep(wi.apart(), &mut sum);
+                sum.take(self.eval_deep(wi.apart(), usize::MAX));
             }
         }
-        // All four alike, so that they are written as one.
-        let [r, g, b, pdf] = array(|k| finite(sum.all[k]));
-        (Eval { f_cos: [r, g, b], pdf }, sum.pdf)
+        sum.eval()
     }
 
-    /// Memory in use: the parts a walk touches, not the room kept for more lobes.
+    /// Memory in use: the parts a walk touches, not the room kept for more lobes, nor what the material holds for all points.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.ops())
+        size_of_val(&*self.ops)
+            + size_of_val(&*self.places)
+            + size_of_val(&*self.rests)
             + size_of_val(&*self.lobes)
             + size_of_val(&*self.balanced)
             + size_of_val(&*self.layers)
@@ -266,44 +264,49 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// [`sample`](Self::sample), its numbers in registers: see [`eval_toward`](Self::eval_toward).
     fn sample_for(&self, u0: S, u1: S, choice: S) -> Option<Sample<S>> {
-        let index = self.choose(choice)?;
-        let l = &self.lobes[index];
-        if l.delta {
+        let lists = self.lists();
+        let index = lists.choose(choice)?;
+        let l = lists.lobe(index);
+        if l.place.delta {
             return self.sample_delta(index, l);
         }
-        let local = l.lobe.sample([u0, u1]).apart();
+        let local = l.sample([u0, u1]).apart();
         if local.z == S::zero() {
             // No direction at all; turned to the world, rounding would put it on either side.
             return None;
         }
-        let wi = self.frames[l.frame as usize].to_world(local);
-        let subsurface = matches!(l.lobe, AnyLobe::Subsurface(_));
+        let wi = lists.frames[l.place.frame as usize].to_world(local);
+        let subsurface = matches!(l.flat.lobe, AimedLobe::Subsurface(_));
         let flags = SampleFlags { transmit: self.crosses(wi), delta: false, subsurface };
         // Where the lobe's own density is 0, as below a horizon, another lobe may scatter, but the sample is not one of its own.
-        let (eval, own) = self.eval_own(wi, index);
-        if own > S::zero() { Self::sampled(wi, eval, flags, l, local) } else { None }
+        let mut sum = Sum::new(index);
+        if self.is_flat() {
+            self.walk_flat(lists, wi, &mut sum);
+        } else {
+            sum.take(self.eval_deep(wi.apart(), index));
+        }
+        if sum.pdf > S::zero() { Self::sampled(wi, sum.eval(), flags, l, local) } else { None }
     }
 
     #[inline(never)]
-    fn sample_delta(&self, index: usize, l: &FlatLobe<'m, S>) -> Option<Sample<S>> {
-        let (local, _) = l.lobe.delta()?;
-        let wi = self.frames[l.frame as usize].to_world(local);
+    fn sample_delta(&self, index: usize, l: Met<'_, 'm, S>) -> Option<Sample<S>> {
+        let (local, _) = l.whole().delta()?;
+        let wi = self.frames[l.place.frame as usize].to_world(local);
         if !is_unit(wi) {
             // Seen along no direction, it has none to send light to.
             return None;
         }
         let f_cos = self.lobe_delta(index, true)?;
         let flags = SampleFlags { transmit: self.crosses(wi), delta: true, ..SampleFlags::default() };
-        Self::sampled(wi, Eval { f_cos, pdf: l.probability() }, flags, l, local)
+        Self::sampled(wi, Eval { f_cos, pdf: l.flat.probability() }, flags, l, local)
     }
 
     /// Whether ωi lies on the other side of the geometric surface than ωo.
     #[inline(always)]
     fn crosses(&self, wi: V3<S>) -> bool {
-        let (i, o) = (self.ng.dot(wi), self.ng.dot(self.wo));
         // By sign, whatever its length; one that is not finite has no sides.
-        let apart = (i.lt(S::zero()) & o.gt(S::zero())) | (i.gt(S::zero()) & o.lt(S::zero()));
-        apart && i.is_finite() && o.is_finite()
+        let i = self.ng.dot(wi) * self.side;
+        (i < S::zero()) & (i >= S::c(-f32::MAX as f64))
     }
 
     /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.
@@ -314,37 +317,13 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 
     #[inline(always)]
-    fn sampled(
-        wi: V3<S>,
-        eval: Eval<S>,
-        flags: SampleFlags,
-        lobe: &FlatLobe<'m, S>,
-        local: V3<S>,
-    ) -> Option<Sample<S>> {
+    fn sampled(wi: V3<S>, eval: Eval<S>, flags: SampleFlags, lobe: Met<'_, 'm, S>, local: V3<S>) -> Option<Sample<S>> {
         let Eval { f_cos, pdf } = eval;
         let weight = f_cos.map(|f| f / pdf);
         // f and pdf are finite.
         let fine = pdf > S::zero() && weight[0].max(weight[1]).max(weight[2]).is_finite();
-        let (eta, roughness) = lobe.lobe.crossing(local);
+        let (eta, roughness) = lobe.flat.lobe.crossing(|| lobe.rest(), local);
         fine.then_some(Sample { wi: [wi.x, wi.y, wi.z], f_cos, pdf, weight, flags, eta, roughness })
-    }
-
-    /// The lobe that `u` in [0, 1) falls to.
-    fn choose(&self, u: S) -> Option<usize> {
-        let mut rest = u.max(S::zero());
-        let mut last = None;
-        for (i, l) in self.lobes.iter().enumerate() {
-            let probability = l.probability();
-            if probability > S::zero() {
-                last = Some(i);
-                if rest < probability {
-                    return last;
-                }
-                rest -= probability;
-            }
-        }
-        // Rounding may leave a little over.
-        last
     }
 
     /// Radiance given off toward ωo.
@@ -382,86 +361,88 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Never below ∫ f·|cos| over the other direction when one direction is `w`, from either side.
     pub fn albedo_bound(&self, w: [S; 3]) -> Rgb<S> {
         let w = unit_or_zero(vector(w));
-        self.walk(w, true, |_, l: &FlatLobe<'m, S>, _, local, _| l.lobe.albedo_bound(local, l.curve))
+        self.walk(w, true, |_, l: Met<'_, 'm, S>, _, local, _| l.bound(local, true))
     }
 
     /// Whether [`walk_flat`](Self::walk_flat) will do: layers as scripts build them, all channels dimmed alike, nothing
     /// solved for.
     #[inline(always)]
     pub(super) fn is_flat(&self) -> bool {
-        self.flat && self.layering.tint == TintRule::Largest && self.balanced.is_empty()
+        self.flat
     }
 
     /// Apart, because its stack is large.
     #[inline(never)]
-    fn eval_deep(&self, wi: V3<S>, sum: &mut Sum<S>) {
-        self.walk(wi, false, sum);
+    fn eval_deep(&self, wi: V3<S>, own: usize) -> Sum<S> {
+        let mut sum = Sum::new(own);
+        self.walk(wi, false, &mut sum);
+        sum
     }
 
     /// [`walk`](Self::walk) for most materials.
     #[inline(always)]
-    fn walk_flat<L: Over<S>>(&self, wi: V3<L>, mut visit: impl Visit<'m, S, L>) {
-        let frames = &*self.frames;
-        let mut stack = FlatStack::<L>::default();
+    fn walk_flat(&self, lists: Lists<'_, 'm, S>, wi: V3<S>, mut visit: impl Visit<'m, S>) {
+        let mut stack = FlatStack::<S>::default();
         let (mut frame, mut local) = (u32::MAX, wi);
-        for (index, l) in self.lobes.iter().enumerate() {
-            if l.frame != frame {
-                frame = l.frame;
-                local = frames[frame as usize].to_local(wi);
+        for (index, l) in lists.met().enumerate() {
+            let place = l.place;
+            if place.frame != frame {
+                frame = place.frame;
+                local = lists.frames[frame as usize].to_local(wi);
             }
-            let scale = stack.step(l.steps, self.layering.rule, L::lift(l.alpha_o));
-            let bound = visit.lobe(index, l, [scale; 3], local, l.in_top);
-            if l.in_top {
-                stack.lobe(l.weight_in_top, bound);
+            let scale = stack.step(place.steps, self.layering.rule, l.flat.alpha_o);
+            let bound = visit.lobe(index, l, [scale; 3], local, place.in_top);
+            if place.in_top {
+                stack.lobe(place.weight_in_top, bound);
             }
         }
     }
 
     /// Visits every lobe, then gives the bound on the whole if it is asked for. `wi` has been looked at: unit or zero.
     #[inline(always)]
-    pub(crate) fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S, S>) -> Rgb<S> {
+    pub(crate) fn walk(&self, wi: V3<S>, bound: bool, visit: impl Visit<'m, S>) -> Rgb<S> {
         match (self.depth, self.layering.tint) {
-            (0..=4, TintRule::Largest) => self.walk_within::<S, 4, 1>(wi, bound, visit),
-            (0..=4, _) => self.walk_within::<S, 4, 3>(wi, bound, visit),
-            _ => self.walk_within::<S, { MAX_LAYERS as usize }, 3>(wi, bound, visit),
+            (0..=4, TintRule::Largest) => self.walk_within::<4, 1>(wi, bound, visit),
+            (0..=4, _) => self.walk_within::<4, 3>(wi, bound, visit),
+            _ => self.walk_within::<{ MAX_LAYERS as usize }, 3>(wi, bound, visit),
         }
     }
 
     #[inline(always)]
-    fn walk_within<L: Over<S>, const D: usize, const C: usize>(
+    fn walk_within<const D: usize, const C: usize>(
         &self,
-        wi: V3<L>,
+        wi: V3<S>,
         bound: bool,
-        mut visit: impl Visit<'m, S, L>,
-    ) -> Rgb<L> {
-        let mut stack = LayerStack::<L, D, C>::default();
+        mut visit: impl Visit<'m, S>,
+    ) -> Rgb<S> {
+        let mut stack = LayerStack::<S, D, C>::default();
         let (mut index, mut layer) = (0, 0);
         let mut frame = u32::MAX;
         let mut local = wi;
-        let (lobes, layers, frames, balanced) = (&*self.lobes, &*self.layers, &*self.frames, &*self.balanced);
+        let (frames, balanced) = (&*self.frames, &*self.balanced);
         for op in self.ops() {
             match *op {
                 Op::Lobe => {
-                    let l = &lobes[index];
-                    if l.frame != frame {
-                        frame = l.frame;
+                    let l = self.lobe(index);
+                    if l.place.frame != frame {
+                        frame = l.place.frame;
                         local = frames[frame as usize].to_local(wi);
                     }
                     let scale = match balanced.get(index) {
                         Some(Some(balanced)) => balanced.scale(local.z),
                         _ => stack.scale(),
                     };
-                    let asked = l.in_top || bound;
+                    let asked = l.place.in_top || bound;
                     let bound = visit.lobe(index, l, scale, local, asked);
                     if asked {
-                        let [r, g, b, _] = l.weight_in_top;
+                        let [r, g, b, _] = l.place.weight_in_top;
                         stack.lobe([r, g, b], bound);
                     }
                     index += 1;
                 }
                 Op::Begin => stack.begin(),
                 Op::Middle => {
-                    let LayerAlpha { alpha_o, weight } = layers[layer];
+                    let LayerAlpha { alpha_o, weight } = self.layer(layer, index);
                     layer += 1;
                     stack.middle(weight, self.layering.rule, self.layering.tint, Some(alpha_o));
                 }
@@ -471,21 +452,31 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
         stack.bound()
     }
 
+    /// A layer whose base begins with the lobe `next`.
+    #[inline(always)]
+    pub(super) fn layer(&self, index: usize, next: usize) -> LayerAlpha<S> {
+        match self.plan {
+            // One lobe at least stands in each base, and its own α with it.
+            Some(plan) => LayerAlpha { alpha_o: [self.lobes[next].alpha_o; 3], weight: plan.layer_weight(index) },
+            None => self.layers[index],
+        }
+    }
+
     /// Whether every layer scales symmetrically in its directions.
     pub fn symmetric_layers(&self) -> bool {
-        self.layers.is_empty() || self.layering.rule != LayeringRule::View
+        self.depth == 0 || self.layering.rule != LayeringRule::View
     }
 }
 
 /// Is shown every lobe: its index, what the layers above it scale it by for this ωi, the direction in its frame, and
 /// whether its bound there is asked for, which is then to be returned.
-pub(crate) trait Visit<'m, S: Real, L> {
-    fn lobe(&mut self, index: usize, lobe: &FlatLobe<'m, S>, scale: Rgb<L>, local: V3<L>, bound: bool) -> Rgb<L>;
+pub(crate) trait Visit<'m, S: Scalar> {
+    fn lobe(&mut self, index: usize, lobe: Met<'_, 'm, S>, scale: Rgb<S>, local: V3<S>, bound: bool) -> Rgb<S>;
 }
 
-impl<'m, S: Real, L, F: FnMut(usize, &FlatLobe<'m, S>, Rgb<L>, V3<L>, bool) -> Rgb<L>> Visit<'m, S, L> for F {
+impl<'m, S: Scalar, F: FnMut(usize, Met<'_, 'm, S>, Rgb<S>, V3<S>, bool) -> Rgb<S>> Visit<'m, S> for F {
     #[inline(always)]
-    fn lobe(&mut self, index: usize, lobe: &FlatLobe<'m, S>, scale: Rgb<L>, local: V3<L>, bound: bool) -> Rgb<L> {
+    fn lobe(&mut self, index: usize, lobe: Met<'_, 'm, S>, scale: Rgb<S>, local: V3<S>, bound: bool) -> Rgb<S> {
         self(index, lobe, scale, local, bound)
     }
 }
@@ -499,11 +490,31 @@ struct Sum<S> {
     pdf: S,
 }
 
-impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
+impl<S: Scalar> Sum<S> {
     #[inline(always)]
-    fn lobe(&mut self, index: usize, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound: bool) -> Rgb<S> {
-        let e = l.lobe.evaluate(local, l.curve, bound);
-        add(&mut self.all, l, scale, local.z, &e);
+    fn new(own: usize) -> Self {
+        Sum { all: [S::zero(); 4], own, pdf: S::zero() }
+    }
+
+    /// As numbers: what comes from a call stays in memory.
+    #[inline(always)]
+    fn take(&mut self, sum: Sum<S>) {
+        (self.all, self.pdf) = (array(|k| sum.all[k]), sum.pdf);
+    }
+
+    #[inline(always)]
+    fn eval(&self) -> Eval<S> {
+        // All four alike, so that they are written as one.
+        let [r, g, b, pdf] = array(|k| finite(self.all[k]));
+        Eval { f_cos: [r, g, b], pdf }
+    }
+}
+
+impl<'m, S: Scalar> Visit<'m, S> for &mut Sum<S> {
+    #[inline(always)]
+    fn lobe(&mut self, index: usize, l: Met<'_, 'm, S>, scale: Rgb<S>, local: V3<S>, bound: bool) -> Rgb<S> {
+        let e = l.evaluate(local, bound);
+        add(&mut self.all, &l.flat.share, scale, local.z, &e);
         self.pdf = if index == self.own { e.pdf } else { self.pdf };
         e.bound
     }
@@ -511,41 +522,13 @@ impl<'m, S: Scalar> Visit<'m, S, S> for &mut Sum<S> {
 
 /// Adds f·|cos| per channel and the pdf of one lobe, scaled by what lies above it.
 #[inline(always)]
-pub(super) fn add<S: Real, L: Over<S>>(sum: &mut [L; 4], l: &FlatLobe<'_, S>, scale: Rgb<L>, cos: L, e: &Evaluated<L>) {
+pub(super) fn add<S: Real, L: Over<S>>(sum: &mut [L; 4], share: &[S; 4], scale: Rgb<L>, cos: L, e: &Evaluated<L>) {
     let cos = cos.abs().min(L::one());
     let values = [e.f[0], e.f[1], e.f[2], e.pdf];
     let scales = [scale[0] * cos, scale[1] * cos, scale[2] * cos, L::one()];
     for k in 0..4 {
         // In this order, because a lobe without color has but one such product.
-        sum[k] += L::lift(l.share[k]) * (values[k] * scales[k]);
-    }
-}
-
-impl<S: Real> FlatLobe<'_, S> {
-    /// Estimates what it scatters toward ωo, `wo` in its frame, where the layers above scale it by `scale`; `share` holds its
-    /// weight. The albedo and its bound there come along. Returns the bound, if it stands in a top – under `view` on that side
-    /// alone –, and what its probability is in proportion to.
-    #[inline(always)]
-    pub(super) fn weigh(&mut self, wo: V3<S>, scale: Rgb<S>, [albedo, bound]: [Rgb<S>; 2]) -> (Rgb<S>, S) {
-        self.albedo = rgb!(c => self.share[c] * scale[c] * albedo[c]);
-        let largest = self.albedo[0].max(self.albedo[1]).max(self.albedo[2]).max(S::zero());
-        // Weights reach 1e30; what matters is their ratio, and that their sum stays finite.
-        let part = largest.min(S::c(1e30));
-        self.share[3] = part;
-        if self.inside && !self.in_top {
-            // As numbers: what comes from a call stays in memory.
-            let [r, g, b] = self.lobe.view_bound(wo.apart(), self.curve);
-            ([r, g, b], part)
-        } else {
-            (bound, part)
-        }
-    }
-}
-
-impl<S: Scalar> FlatLobe<'_, S> {
-    /// The bound at a direction, if it is asked for.
-    pub(super) fn bound(&self, local: V3<S>, asked: bool) -> Rgb<S> {
-        if asked { self.lobe.albedo_bound(local, self.curve) } else { [S::zero(); 3] }
+        sum[k] += L::lift(share[k]) * (values[k] * scales[k]);
     }
 }
 

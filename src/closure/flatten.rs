@@ -4,16 +4,17 @@
 //! tangent share a frame.
 
 use super::balance::{Balance, Chain};
-use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
+use super::bsdf::{Bsdf, Op};
 use super::layer::{LayerStack, LayeringRule, TintRule, step};
-use super::sites::Site;
+use super::met::{FlatLobe, KNOWN, LayerAlpha, Place};
+use super::sites::{Known, Site};
 use super::tree::{ClosureTree, MAX_LAYERS, TreeError};
 use super::walk::{self, LobeVisit, Stand, Visitor, Weights, first, walk};
 use crate::albedo::{AlbedoCurve, Precision, TableSpec};
 use crate::globals::Globals;
 use crate::lobes::registry::LobeClass;
 use crate::lobes::signals::SignalKind;
-use crate::lobes::{AnyLobe, LobeKind, Rgb};
+use crate::lobes::{AimedLobe, AnyLobe, LobeKind, Rgb};
 use crate::optics::{Scalar, V3, frame};
 use glam::Vec3;
 use smallvec::SmallVec;
@@ -46,20 +47,17 @@ impl<S: Scalar> TableCache<S> {
 }
 
 /// The albedo curves of a material, found by the site that constructs the lobe.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Curves<S: Scalar> {
     baked: Vec<(TableSpec, Arc<AlbedoCurve<S>>)>,
-    /// By number.
+    /// By number; the first is of those that are not there.
     sites: Vec<Known<S>>,
-    none: AlbedoCurve<S>,
 }
 
-/// What is known of a site before shading.
-#[derive(Clone, Debug, Default)]
-struct Known<S: Scalar> {
-    /// One of those baked.
-    curve: Option<Arc<AlbedoCurve<S>>>,
-    lobe: Option<Site<S>>,
+impl<S: Scalar> Default for Curves<S> {
+    fn default() -> Self {
+        Curves { baked: Vec::new(), sites: vec![Known { curve: Arc::default(), site: None }] }
+    }
 }
 
 impl<S: Scalar> Curves<S> {
@@ -81,15 +79,15 @@ impl<S: Scalar> Curves<S> {
     /// The same tables in another type, rounded to double precision.
     pub fn cast<T: Scalar>(&self) -> Curves<T> {
         let baked: Vec<_> = self.baked.iter().map(|(spec, curve)| (*spec, Arc::new(curve.cast()))).collect();
-        let none = AlbedoCurve::default();
-        let known = |site: &Known<S>| {
-            let same = |own: &Arc<AlbedoCurve<S>>| self.baked.iter().position(|(_, c)| Arc::ptr_eq(c, own));
-            let curve: Option<Arc<AlbedoCurve<T>>> = site.curve.as_ref().and_then(same).map(|i| baked[i].1.clone());
-            let lobe = site.lobe.as_ref().and_then(|l| l.cast(curve.as_deref().unwrap_or(&none)));
-            Known { curve, lobe }
+        let none = Arc::default();
+        let known = |known: &Known<S>| {
+            let same = self.baked.iter().position(|(_, c)| Arc::ptr_eq(c, &known.curve));
+            let curve: Arc<AlbedoCurve<T>> = same.map_or(&none, |i| &baked[i].1).clone();
+            let site = known.site.as_ref().and_then(|site| site.cast(&curve));
+            Known { curve, site }
         };
         let sites = self.sites.iter().map(known).collect();
-        Curves { baked, sites, none }
+        Curves { baked, sites }
     }
 
     /// Bakes the curve of one construction site; sites that ask for the same curve share it.
@@ -108,7 +106,7 @@ impl<S: Scalar> Curves<S> {
             }
         };
         let curve = self.baked[index].1.clone();
-        *self.known(site) = Known { curve: Some(curve), lobe: None };
+        *self.known(site) = Known { curve, site: None };
     }
 
     /// [`set_shared`](Self::set_shared) with the table of a lobe whose parameter block is known as far as `known` says,
@@ -122,13 +120,15 @@ impl<S: Scalar> Curves<S> {
         cache: &TableCache<S>,
     ) {
         self.set_shared(site, kind.table(known), precision, cache);
-        self.known(site).lobe = Site::new(kind, known, self.of(site));
+        self.known(site).site = Site::new(kind, known, self.of(site));
     }
 
     fn known(&mut self, site: u32) -> &mut Known<S> {
-        let count = self.sites.len().max(site as usize + 1);
-        self.sites.resize(count, Known::default());
-        &mut self.sites[site as usize]
+        let index = site as usize + 1;
+        if self.sites.len() <= index {
+            self.sites.resize(index + 1, self.sites[0].clone());
+        }
+        &mut self.sites[index]
     }
 
     /// Memory the tables take.
@@ -137,16 +137,13 @@ impl<S: Scalar> Curves<S> {
     }
 
     pub(super) fn of(&self, site: u32) -> &AlbedoCurve<S> {
-        self.at(site).0
+        &self.at(site).curve
     }
 
     /// The curve of a site and what else is known of it.
     #[inline(always)]
-    pub(super) fn at(&self, site: u32) -> (&AlbedoCurve<S>, Option<&Site<S>>) {
-        match self.sites.get(site as usize) {
-            Some(Known { curve, lobe }) => (curve.as_deref().unwrap_or(&self.none), lobe.as_ref()),
-            None => (&self.none, None),
-        }
+    pub(super) fn at(&self, site: u32) -> &Known<S> {
+        self.sites.get(site as usize + 1).unwrap_or(&self.sites[0])
     }
 }
 
@@ -339,16 +336,15 @@ impl<'b, 'm, S: Scalar, const D: usize> Flattener<'b, 'm, S, D> {
         self.standing.len() as u32 - 1
     }
 
-    /// The lobe just made is no lobe: it gives off light, or tells the renderer something.
+    /// What was made is no lobe: it gives off light, or tells the renderer something.
     #[cold]
-    fn emission(&mut self, w: Weights<S>, scale: Rgb<S>) {
-        let Some(l) = self.bsdf.lobes.pop() else { return };
+    fn emission(&mut self, made: &AnyLobe<S>, w: Weights<S>, scale: Rgb<S>) {
         let value = std::array::from_fn(|c| w.total[c] * scale[c]);
-        if let AnyLobe::Emission(emission) = l.lobe {
+        if let AnyLobe::Emission(emission) = made {
             for c in 0..3 {
                 self.bsdf.emission[c] += value[c] * emission.radiance();
             }
-        } else if let Some(kind) = SignalKind::of(&l.lobe) {
+        } else if let Some(kind) = SignalKind::of(made) {
             self.bsdf.signal(kind, value);
         }
     }
@@ -380,9 +376,9 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
     }
 
     fn lobe(&mut self, visit: LobeVisit<'_, S>) {
-        let (curve, known) = self.curves.at(visit.site);
+        let at = self.curves.at(visit.site);
         let LobeVisit { kind, site, values, weights: w } = visit;
-        let known = known.filter(|k| k.is_of(kind, values));
+        let known = at.site.as_ref().filter(|k| k.is_of(kind, values));
         let (tint, stand, class) = match known {
             Some(known) => (known.tint, known.stand, known.class),
             None => (Some(kind.weight(values)), Stand::of(kind, values), kind.class()),
@@ -399,37 +395,43 @@ impl<S: Scalar, const D: usize> Visitor<S> for Flattener<'_, '_, S, D> {
         // Under `view` α is 1 − E_view(ωo), so the walk for ωo sums bounds on that side alone.
         let view = self.bsdf.layering.rule == LayeringRule::View;
         let balanced = self.balance.and_then(|b| b.find(met, site, normal, &self.chain, wo.z));
-        self.bsdf.lobes.push(FlatLobe {
-            share: w.total,
-            lobe: AnyLobe::nothing(),
-            curve,
+        let (in_top, delta) = (w.inside && !view, class == LobeClass::Delta);
+        let (steps, alpha_o) = (self.flat.steps, self.flat.alpha_o);
+        let (zero, lobe) = ([S::zero(); 3], AimedLobe::nothing());
+        self.bsdf.lobes.push(FlatLobe { share: w.total, albedo: zero, alpha_o, known: at, lobe });
+        let Some(l) = self.bsdf.lobes.last_mut() else { return };
+        let (mut rest, curve) = (KNOWN, &*at.curve);
+        // Made where it stays: what has just been stored in parts would have to be waited for.
+        let [albedo, bound] = match known.and_then(|k| k.turn(wo, curve, in_top, &mut l.lobe)) {
+            Some(albedos) => albedos,
+            None => {
+                let made = AnyLobe::new(kind, values, wo, curve);
+                if class == LobeClass::Emission {
+                    self.bsdf.lobes.pop();
+                    self.emission(&made, w, scale);
+                    return;
+                }
+                l.lobe = AimedLobe::of(&made);
+                if known.is_none() && made.is_kept_apart() {
+                    rest = self.bsdf.rests.len() as u32;
+                    self.bsdf.rests.push(made);
+                }
+                made.albedos(wo, curve, in_top)
+            }
+        };
+        l.weigh(scale, albedo);
+        self.bsdf.places.push(Place {
+            weight_in_top: w.in_top,
             site,
             frame,
-            weight_in_top: w.in_top,
-            alpha_o: self.flat.alpha_o,
-            steps: self.flat.steps,
+            rest,
+            steps,
             inside: w.inside,
-            in_top: w.inside && !view,
-            delta: class == LobeClass::Delta,
-            albedo: [S::zero(); 3],
+            in_top,
+            delta,
         });
-        let Some(l) = self.bsdf.lobes.last_mut() else { return };
-        // Made where it stays, because there is room for the largest.
-        let in_top = l.in_top;
-        let albedos = known.and_then(|k| k.turn(wo, curve, in_top, &mut l.lobe));
-        if albedos.is_none() {
-            l.lobe = AnyLobe::new(kind, values, wo, curve);
-        }
-        if class == LobeClass::Emission {
-            self.emission(w, scale);
-            return;
-        }
-        let albedos = match albedos {
-            Some(albedos) => albedos,
-            None => l.lobe.albedos(wo, curve, in_top),
-        };
-        let (bound, _) = l.weigh(wo, scale, albedos);
         if w.inside {
+            let bound = if in_top { bound } else { self.bsdf.lobe(self.bsdf.lobes.len() - 1).view_bound(wo) };
             self.stack.lobe(first(w.in_top), bound);
         }
         if let Some(param) = self.balance.map(|b| b.parameter(site, values)) {
@@ -554,6 +556,27 @@ mod tests {
                     assert_eq!(found, evaluate(&bsdf), "{shape}, {rule:?}, from {wo:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn of_very_many_lobes_each_has_its_own_rest() {
+        let mut tree = ClosureTree::new();
+        let block = |k: u32| [0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.1 + 1e-5 * k as f32, 0.0, 0.0, 1.0];
+        let mut root = tree.lobe(LobeKind::Sheen, 0, &block(0));
+        for k in 1..70_000 {
+            let lobe = tree.lobe(LobeKind::Sheen, 0, &block(k));
+            root = tree.add(root, lobe);
+        }
+        tree.set_root(root);
+        let (curves, wo) = (Curves::<f32>::default(), V3::polar(0.7, 0.4));
+        let bsdf = flatten(&tree, &Globals::default(), wo, Layering::default(), &curves).expect("within budget");
+        for k in [0, 1, 65_535, 65_536, 69_999] {
+            let local = bsdf.lobe_frame(k).to_local(wo);
+            let alone = AnyLobe::new(LobeKind::Sheen, &block(k as u32), local, &curves.at(0).curve);
+            let whole = bsdf.lobe(k).whole();
+            let wi = V3::polar(0.3, 2.0);
+            assert_eq!(whole.f(wi, &curves.at(0).curve), alone.f(wi, &curves.at(0).curve), "{k}");
         }
     }
 }

@@ -4,14 +4,16 @@
 //! eight directions at one point. Elsewhere, and on processors without such vectors, there is one BSDF per point.
 
 use super::batch::{BLOCKS, Block, LANES};
-use super::bsdf::{Bsdf, Eval, FlatLobe, add, unit_or_zero};
+use super::bsdf::{Bsdf, Eval, add, unit_or_zero};
 use super::flatten::Curves;
+use super::met::{FlatLobe, Place};
 use super::plan::Plan;
 use super::tree::ClosureTree;
 use crate::globals::Globals;
-use crate::lobes::host::Host;
-use crate::lobes::{Evaluated, Listed, Lobe, LobeVisitor};
-use crate::optics::{F32x8, Lanes, Lift, dispatch};
+use crate::lobes::host::HostSeen;
+use crate::lobes::{AimedLobe, AnyLobe, Evaluated, Listed, LobeVisitor, host_again};
+use crate::optics::{F32x8, Lanes, Lift, V3, dispatch};
+use std::marker::PhantomData;
 
 /// The BSDFs of one material at many points, see [`Material::shade_many`](crate::Material::shade_many). Memory is used again.
 ///
@@ -35,6 +37,8 @@ pub struct Bsdfs<'m> {
     len: usize,
     /// Of points one after the other; those beyond the last repeat it.
     eights: Vec<Bsdf<'m, F32x8>>,
+    /// What their lobes do not keep themselves: the same for all.
+    rests: Vec<AnyLobe<F32x8>>,
     /// In place of them.
     each: Vec<Bsdf<'m>>,
     /// Which of the two.
@@ -70,7 +74,7 @@ impl<'m> Bsdfs<'m> {
         let count = self.len.min(wi.len()).min(out.len());
         let (wi, out) = (&wi[..count], &mut out[..count]);
         if self.abreast {
-            dispatch::lanes(Abreast { eights: &self.eights, wi, out });
+            dispatch::lanes(Abreast { eights: &self.eights, rests: &self.rests, wi, out });
         } else {
             for ((bsdf, wi), out) in self.each.iter().zip(wi).zip(out) {
                 *out = bsdf.eval(*wi);
@@ -85,6 +89,7 @@ impl<'m> Bsdfs<'m> {
         if self.eights.len() < count {
             self.eights.resize_with(count, Bsdf::black);
         }
+        plan.rests(curves, &mut self.rests);
         for (k, eight) in self.eights[..count].iter_mut().enumerate() {
             let at: [usize; LANES] = std::array::from_fn(|i| (k * LANES + i).min(points.len() - 1));
             plan.turn_eight(at.map(|i| &points[i]), at.map(|i| wo[i]), curves, eight);
@@ -109,6 +114,7 @@ impl<'m> Bsdfs<'m> {
 /// The work of [`Bsdfs::eval`].
 struct Abreast<'a, 'm> {
     eights: &'a [Bsdf<'m, F32x8>],
+    rests: &'a [AnyLobe<F32x8>],
     wi: &'a [[f32; 3]],
     out: &'a mut [Eval],
 }
@@ -122,7 +128,7 @@ impl dispatch::LaneWork for Abreast<'_, '_> {
             // Nothing stands abreast without them: no code for that.
             return;
         }
-        let Abreast { eights, wi, out } = self;
+        let Abreast { eights, rests, wi, out } = self;
         let groups = eights.chunks(BLOCKS).zip(wi.chunks(BLOCKS * LANES)).zip(out.chunks_mut(BLOCKS * LANES));
         for ((eights, wi), out) in groups {
             let mut blocks = [Block::<L>::black(); BLOCKS];
@@ -134,7 +140,7 @@ impl dispatch::LaneWork for Abreast<'_, '_> {
                 });
             }
             let count = wi.len().div_ceil(LANES);
-            evaluate(&eights[..count], &mut blocks[..count]);
+            evaluate(&eights[..count], rests, &mut blocks[..count]);
             for (block, out) in blocks.iter().zip(out.chunks_mut(LANES)) {
                 match out.first_chunk_mut() {
                     Some(out) => block.store(out),
@@ -151,79 +157,100 @@ impl dispatch::LaneWork for Abreast<'_, '_> {
 
 /// Adds up every lobe.
 #[inline(always)]
-fn evaluate<L: Lanes>(eights: &[Bsdf<'_, F32x8>], blocks: &mut [Block<L>]) {
+fn evaluate<L: Lanes>(eights: &[Bsdf<'_, F32x8>], rests: &[AnyLobe<F32x8>], blocks: &mut [Block<L>]) {
     let Some(first) = eights.first() else { return };
     let rule = first.layering.rule;
     let mut frame = u32::MAX;
-    for (index, of_first) in first.lobes.iter().enumerate() {
-        let turns = of_first.frame != frame;
-        frame = of_first.frame;
+    for (index, (place, rest)) in first.places().iter().zip(rests).enumerate() {
+        let turns = place.frame != frame;
+        frame = place.frame;
         for (block, eight) in blocks.iter_mut().zip(eights) {
             if turns {
                 block.local = eight.frames[frame as usize].to_local(block.wi);
             }
             let alpha_o = <L as Lift<F32x8>>::lift(eight.lobes[index].alpha_o);
-            block.scale = block.stack.step(of_first.steps, rule, alpha_o);
+            block.scale = block.stack.step(place.steps, rule, alpha_o);
         }
-        of_first.lobe.visit(Visit { eights, index, blocks: &mut *blocks });
+        first.lobes[index].lobe.visit(Visit { eights, place, rest, index, blocks: &mut *blocks });
     }
 }
 
 /// One lobe of the tree, at all points.
 struct Visit<'a, 'm, L> {
     eights: &'a [Bsdf<'m, F32x8>],
+    place: &'a Place<f32>,
+    rest: &'a AnyLobe<F32x8>,
     index: usize,
     blocks: &'a mut [Block<L>],
 }
 
 impl<L: Lanes> Visit<'_, '_, L> {
     #[inline(always)]
-    fn add(block: &mut Block<L>, l: &FlatLobe<'_, F32x8>, e: &Evaluated<L>) {
-        add(&mut block.sum, l, [block.scale; 3], block.local.z, e);
-        if l.in_top {
-            block.stack.lobe(l.weight_in_top, e.bound);
+    fn add_up(self, lobe: impl Evaluate<L>) {
+        let Visit { eights, place, rest, index, blocks } = self;
+        for (block, eight) in blocks.iter_mut().zip(eights) {
+            let l = &eight.lobes[index];
+            // Of one plan, all are of one kind.
+            if let Some(e) = lobe.toward(l, rest, block.local, place.in_top) {
+                add(&mut block.sum, &l.share, [block.scale; 3], block.local.z, &e);
+                if place.in_top {
+                    block.stack.lobe(place.weight_in_top, e.bound);
+                }
+            }
         }
+    }
+}
+
+/// What a kind of lobe gives toward a direction. No closure, because those cannot be told to be inlined.
+trait Evaluate<L> {
+    fn toward(&self, l: &FlatLobe<'_, F32x8>, rest: &AnyLobe<F32x8>, wi: V3<L>, bound: bool) -> Option<Evaluated<L>>;
+}
+
+/// One of the list.
+struct OfList<B>(PhantomData<B>);
+
+impl<L: Lanes, B: Listed<F32x8>> Evaluate<L> for OfList<B> {
+    #[inline(always)]
+    fn toward(&self, l: &FlatLobe<'_, F32x8>, rest: &AnyLobe<F32x8>, wi: V3<L>, bound: bool) -> Option<Evaluated<L>> {
+        Some(B::evaluate_kept(B::kept(&l.lobe)?, || B::listed(rest), wi, &l.known.curve, bound))
+    }
+}
+
+/// A host's.
+struct OfHost;
+
+impl<L: Lanes> Evaluate<L> for OfHost {
+    #[inline(always)]
+    fn toward(&self, l: &FlatLobe<'_, F32x8>, rest: &AnyLobe<F32x8>, wi: V3<L>, _: bool) -> Option<Evaluated<L>> {
+        let AimedLobe::Host(kept) = &l.lobe else { return None };
+        let lobe = host_again(kept, || Some(rest))?;
+        Some(Evaluated { f: lobe.f(wi), pdf: lobe.pdf(wi), bound: lobe.albedo_bound(wi) })
     }
 }
 
 impl<L: Lanes> LobeVisitor<F32x8> for Visit<'_, '_, L> {
     #[inline(always)]
-    fn scattering<B: Lobe<F32x8> + Listed<F32x8>>(self, _: &B) {
-        L::apart(Added { visit: self, lobe: std::marker::PhantomData::<B> });
+    fn scattering<B: Listed<F32x8>>(self) {
+        L::apart(Added { visit: self, lobe: OfList::<B>(PhantomData) });
     }
 
-    fn host(self, _: &Host<F32x8>) {
-        for (block, eight) in self.blocks.iter_mut().zip(self.eights) {
-            let l = &eight.lobes[self.index];
-            if let crate::lobes::AnyLobe::Host(lobe) = &l.lobe {
-                let local = block.local;
-                let e = Evaluated { f: lobe.f(local), pdf: lobe.pdf(local), bound: lobe.albedo_bound(local) };
-                Self::add(block, l, &e);
-            }
-        }
+    fn host(self, _: &HostSeen<F32x8>) {
+        self.add_up(OfHost);
     }
 }
 
 /// A kind of lobe added up, in a function of its own.
 struct Added<'a, 'm, L, B> {
     visit: Visit<'a, 'm, L>,
-    lobe: std::marker::PhantomData<B>,
+    lobe: B,
 }
 
-impl<L: Lanes, B: Lobe<F32x8> + Listed<F32x8>> dispatch::Work for Added<'_, '_, L, B> {
+impl<L: Lanes, B: Evaluate<L>> dispatch::Work for Added<'_, '_, L, B> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Visit { eights, index, blocks } = self.visit;
-        for (block, eight) in blocks.iter_mut().zip(eights) {
-            let l = &eight.lobes[index];
-            // Of one plan, all are of one kind.
-            if let Some(lobe) = B::listed(&l.lobe) {
-                let e = lobe.evaluate(block.local, l.curve, l.in_top);
-                Visit::add(block, l, &e);
-            }
-        }
+        self.visit.add_up(self.lobe);
     }
 }
 

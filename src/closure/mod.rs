@@ -7,6 +7,7 @@ pub mod builder;
 pub mod flatten;
 pub mod layer;
 mod many;
+mod met;
 pub mod parts;
 pub(crate) mod plan;
 pub mod query;

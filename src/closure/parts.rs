@@ -1,8 +1,9 @@
 //! A BSDF lobe by lobe: what audits integrate, and what a material asks of the renderer beside scattering.
 
-use super::bsdf::{Bsdf, FlatLobe, finite, unit_or_zero};
+use super::bsdf::{Bsdf, finite, unit_or_zero};
+use super::met::Met;
 use crate::lobes::signals::SignalKind;
-use crate::lobes::{AnyLobe, LobeKind, Rgb};
+use crate::lobes::{AimedLobe, LobeKind, Rgb};
 use crate::optics::{Frame, Scalar, V3};
 
 /// Something a material tells the renderer.
@@ -55,11 +56,11 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// What is to be scattered below the surface, for a renderer that does so itself. The BSDF counts it as diffuse.
     pub fn subsurface(&self) -> impl Iterator<Item = SubsurfacePart<S>> {
-        self.lobes.iter().filter_map(|l| match &l.lobe {
-            AnyLobe::Subsurface(lobe) => {
+        self.met().filter_map(|l| match &l.flat.lobe {
+            AimedLobe::Subsurface(lobe) => {
                 let (radius, anisotropy, ior) = lobe.medium();
-                let n = self.frames[l.frame as usize].n;
-                Some(SubsurfacePart { albedo: l.albedo, normal: [n.x, n.y, n.z], radius, anisotropy, ior })
+                let n = self.frames[l.place.frame as usize].n;
+                Some(SubsurfacePart { albedo: l.flat.albedo, normal: [n.x, n.y, n.z], radius, anisotropy, ior })
             }
             _ => None,
         })
@@ -77,45 +78,46 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// The direction delta lobe `index` scatters to, in world space; `None` for other lobes.
     pub(crate) fn lobe_delta_direction(&self, index: usize) -> Option<[S; 3]> {
-        let (local, _) = self.lobes[index].lobe.delta()?;
-        let wi = self.frames[self.lobes[index].frame as usize].to_world(local);
+        let l = self.lobe(index);
+        let (local, _) = if l.place.delta { l.whole().delta()? } else { return None };
+        let wi = self.lobe_frame(index).to_world(local);
         Some([wi.x, wi.y, wi.z])
     }
 
     /// The direction lobe `index` scatters to for two uniform numbers, in world space, and its density over solid angle;
     /// `None` for delta lobes, where it scatters nothing that way, and for lobes that do not count.
     pub(crate) fn lobe_sample(&self, index: usize, u: [S; 2]) -> Option<(V3<S>, S)> {
-        let l = &self.lobes[index];
-        if l.delta || l.probability() <= S::zero() {
+        let l = self.lobe(index);
+        if l.place.delta || l.flat.probability() <= S::zero() {
             return None;
         }
-        let local = l.lobe.sample(u);
-        let pdf = l.lobe.pdf(local);
-        (pdf > S::zero()).then(|| (self.frames[l.frame as usize].to_world(local), pdf))
+        let local = l.sample(u);
+        let pdf = l.pdf(local);
+        (pdf > S::zero()).then(|| (self.lobe_frame(index).to_world(local), pdf))
     }
 
     /// What delta lobe `index` scatters, with or without the layers above it (which look at ωo and at its own
     /// direction); `None` for other lobes.
     pub(crate) fn lobe_delta(&self, index: usize, layered: bool) -> Option<Rgb<S>> {
-        let l = &self.lobes[index];
-        let (local, part) = l.lobe.delta()?;
-        let wi = self.frames[l.frame as usize].to_world(local);
+        let l = self.lobe(index);
+        let (local, part) = if l.place.delta { l.whole().delta()? } else { return None };
+        let wi = self.lobe_frame(index).to_world(local);
         let mut scale = [S::one(); 3];
         if layered {
-            self.walk(wi, false, |i, l: &FlatLobe<'m, S>, s: Rgb<S>, local: V3<S>, bound| {
+            self.walk(wi, false, |i, l: Met<'_, 'm, S>, s: Rgb<S>, local: V3<S>, bound| {
                 if i == index {
                     scale = s
                 }
                 l.bound(local, bound)
             });
         }
-        Some(std::array::from_fn(|c| l.share[c] * scale[c] * part[c]))
+        Some(std::array::from_fn(|c| l.flat.share[c] * scale[c] * part[c]))
     }
 
     /// w·f·|cos θi| of lobe `index` alone, with or without the layers above it.
     pub(crate) fn lobe_part(&self, index: usize, wi: V3<S>, layered: bool) -> Rgb<S> {
         let mut result = [S::zero(); 3];
-        self.walk(unit_or_zero(wi), false, |i, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
+        self.walk(unit_or_zero(wi), false, |i, l: Met<'_, 'm, S>, scale: Rgb<S>, local: V3<S>, bound| {
             if i == index {
                 let scale = if layered { scale } else { [S::one(); 3] };
                 result = weighted(l, scale, local, Cosine::Light, self.cos_o(l));
@@ -128,8 +130,8 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// Like `eval`, its cosine chosen, with only the lobes whose frame and kind `pick` accepts.
     pub(crate) fn part(&self, wi: V3<S>, cosine: Cosine, pick: impl Fn(&Frame<S>, LobeKind) -> bool) -> Rgb<S> {
         let mut sum = [S::zero(); 3];
-        self.walk(unit_or_zero(wi), false, |_, l: &FlatLobe<'m, S>, scale: Rgb<S>, local: V3<S>, bound| {
-            if pick(&self.frames[l.frame as usize], l.lobe.kind()) {
+        self.walk(unit_or_zero(wi), false, |_, l: Met<'_, 'm, S>, scale: Rgb<S>, local: V3<S>, bound| {
+            if pick(&self.frames[l.place.frame as usize], l.flat.lobe.kind()) {
                 let part = weighted(l, scale, local, cosine, self.cos_o(l));
                 for c in 0..3 {
                     sum[c] += part[c];
@@ -141,8 +143,8 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     }
 
     /// |N·ωo| of a lobe.
-    fn cos_o(&self, l: &FlatLobe<'m, S>) -> S {
-        self.frames[l.frame as usize].n.dot(self.wo).abs().min(S::one())
+    fn cos_o(&self, l: Met<'_, 'm, S>) -> S {
+        self.frames[l.place.frame as usize].n.dot(self.wo).abs().min(S::one())
     }
 
     /// The frames in use, one per distinct normal and tangent.
@@ -152,21 +154,21 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     /// The frame of lobe `index`.
     pub fn lobe_frame(&self, index: usize) -> &Frame<S> {
-        &self.frames[self.lobes[index].frame as usize]
+        &self.frames[self.places()[index].frame as usize]
     }
 
     /// What lobe `index` is, and the place in the program that made it.
     pub fn lobe_kind(&self, index: usize) -> (LobeKind, u32) {
-        (self.lobes[index].lobe.kind(), self.lobes[index].site)
+        (self.lobes[index].lobe.kind(), self.places()[index].site)
     }
 }
 
-fn weighted<S: Scalar>(l: &FlatLobe<'_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine, cos_o: S) -> Rgb<S> {
-    let f = l.lobe.f(local, l.curve);
+fn weighted<S: Scalar>(l: Met<'_, '_, S>, scale: Rgb<S>, local: V3<S>, cosine: Cosine, cos_o: S) -> Rgb<S> {
+    let f = l.f(local);
     let cos = match cosine {
         Cosine::Light => local.z.abs().min(S::one()),
-        Cosine::View => cos_o * l.lobe.relative_eta(local).sq(),
-        Cosine::None => l.lobe.relative_eta(local),
+        Cosine::View => cos_o * l.relative_eta(local).sq(),
+        Cosine::None => l.relative_eta(local),
     };
-    std::array::from_fn(|c| l.share[c] * scale[c] * f[c] * cos)
+    std::array::from_fn(|c| l.flat.share[c] * scale[c] * f[c] * cos)
 }

@@ -5,13 +5,14 @@
 //! other, and [`Plan::turn`] does what is left to do at a point, giving the same bits. For trees that [`FlatStack`] walks, with
 //! nothing solved for.
 
-use super::bsdf::{Bsdf, FlatLobe, LayerAlpha, Op};
+use super::bsdf::{Bsdf, Op};
 use super::flatten::{Curves, Layering};
 use super::layer::{FlatStack, LayeringRule, TintRule, step};
+use super::met::{FlatLobe, Place};
 use super::sites::Site;
 use crate::albedo::AlbedoCurve;
 use crate::globals::Globals;
-use crate::lobes::{AnyLobe, LobeKind, Rgb};
+use crate::lobes::{AimedLobe, AnyLobe, LobeKind, Rgb};
 use crate::optics::{F32x8, Frame, Over, Scalar, V3, frame, lifted};
 use glam::Vec3;
 
@@ -82,53 +83,53 @@ pub struct Plan<S> {
     depth: u16,
     /// In the order in which lobes first ask for them.
     frames: Vec<Axes>,
-    lobes: Vec<Planned<S>>,
+    /// What each lobe is, and its weight from the root; the fourth is idle.
+    lobes: Vec<(LobeKind, [S; 4])>,
+    places: Vec<Place<S>>,
     /// Weights of the layers, relative to the tops they stand in.
     layers: Vec<Rgb<S>>,
     ops: Vec<Op>,
 }
 
-/// A lobe of a [`Plan`].
-#[derive(Clone, Copy, Debug)]
-struct Planned<S> {
-    kind: LobeKind,
-    site: u32,
-    frame: u32,
-    steps: u8,
-    /// It stands in a top.
-    inside: bool,
-    delta: bool,
-    /// From the root; the fourth is idle.
-    weight: [S; 4],
-    weight_in_top: [S; 4],
-}
-
 impl<S: Scalar> Plan<S> {
+    /// The tree written out.
+    #[inline(always)]
+    pub(super) fn ops(&self) -> &[Op] {
+        &self.ops
+    }
+
+    /// Where each lobe stands.
+    #[inline(always)]
+    pub(super) fn places(&self) -> &[Place<S>] {
+        &self.places
+    }
+
+    /// The weight of a layer, relative to the top it stands in.
+    pub(super) fn layer_weight(&self, index: usize) -> Rgb<S> {
+        self.layers[index]
+    }
+
     /// The plan of a tree that was flattened to `bsdf` where no two directions coincide by chance; `axes` knows where those of
     /// a site come from. `None` if it is not of the kind this is for.
     pub(crate) fn of(bsdf: &Bsdf<'_, S>, curves: &Curves<S>, axes: impl Fn(u32) -> Option<Axes>) -> Option<Plan<S>> {
-        let dark = bsdf.emission.iter().all(|e| *e <= S::zero()) && bsdf.signals.is_empty();
-        let middles = bsdf.lobes.iter().filter(|l| l.steps & step::MIDDLE != 0).count();
-        if !bsdf.is_flat() || !dark || middles != bsdf.layers.len() {
+        let signals = !bsdf.signals.is_empty() || bsdf.emission.iter().any(|e| *e > S::zero());
+        let middles = bsdf.places.iter().filter(|p| p.steps & step::MIDDLE != 0).count();
+        if !bsdf.is_flat() || signals || middles != bsdf.layers.len() {
             return None;
         }
         let mut frames = Vec::new();
-        let mut planned = |l: &FlatLobe<'_, S>| {
-            let axes = axes(l.site)?;
-            if l.frame as usize == frames.len() {
+        for p in &bsdf.places {
+            let axes = axes(p.site)?;
+            if p.frame as usize == frames.len() {
                 frames.push(axes);
             }
             // Turned from what is known of its site: all its parameters but directions.
-            curves.at(l.site).1?;
-            let kind = l.lobe.kind();
-            let (weight, weight_in_top) = (l.share, l.weight_in_top);
-            let (inside, delta) = (l.inside, l.delta);
-            Some(Planned { kind, site: l.site, frame: l.frame, steps: l.steps, inside, delta, weight, weight_in_top })
-        };
-        let lobes = bsdf.lobes.iter().map(&mut planned).collect::<Option<Vec<_>>>()?;
-        let layers = bsdf.layers.iter().map(|l| l.weight).collect();
+            curves.at(p.site).site.as_ref()?;
+        }
+        let lobes = bsdf.lobes.iter().map(|l| (l.lobe.kind(), l.share)).collect();
+        let (places, layers) = (bsdf.places.to_vec(), bsdf.layers.iter().map(|l| l.weight).collect());
         let (layering, depth, ops) = (bsdf.layering, bsdf.depth, bsdf.ops().to_vec());
-        (frames.len() == bsdf.frames.len()).then_some(Plan { layering, depth, frames, lobes, layers, ops })
+        (frames.len() == bsdf.frames.len()).then_some(Plan { layering, depth, frames, lobes, places, layers, ops })
     }
 
     /// The BSDF at a point, seen from `wo` (world space, any length), into memory that is used again.
@@ -141,6 +142,7 @@ impl<S: Scalar> Plan<S> {
     fn turn_toward<'m>(&'m self, globals: &Globals, x: S, y: S, z: S, curves: &'m Curves<S>, bsdf: &mut Bsdf<'m, S>) {
         let wo = frame::normalize_or_zero(V3::new(x, y, z));
         bsdf.reset(wo, vector(globals.ng), self.layering, self.depth);
+        bsdf.plan = Some(self);
         // The first frame's is at hand: what has just been stored in parts would have to be waited for.
         let local = match self.frames.split_first() {
             Some((first, more)) => {
@@ -165,54 +167,44 @@ impl<S: Scalar> Plan<S> {
         curves: &'m Curves<S>,
         bsdf: &mut Bsdf<'m, L>,
     ) {
-        bsdf.planned_ops = &self.ops;
-        let view = self.layering.rule == LayeringRule::View;
-        let mut layers = self.layers.iter();
         let mut stack = FlatStack::<L>::default();
         let mut frame = 0;
         let (mut alpha_o, mut total) = (L::one(), L::zero());
-        for p in &self.lobes {
+        for (p, (kind, weight)) in self.places.iter().zip(&self.lobes) {
             if p.frame != frame {
                 frame = p.frame;
                 local = bsdf.frames[frame as usize].to_local(wo);
             }
-            if p.steps & step::MIDDLE != 0
-                && let Some(weight) = layers.next()
-            {
+            if p.steps & step::MIDDLE != 0 {
                 alpha_o = stack.alpha();
-                bsdf.layers.push(LayerAlpha { alpha_o: [alpha_o; 3], weight: lifted(*weight) });
             }
             let scale = stack.step(p.steps, self.layering.rule, alpha_o);
-            let (curve, site) = curves.at(p.site);
-            let in_top = p.inside && !view;
-            bsdf.lobes.push(FlatLobe {
-                share: lifted(p.weight),
-                lobe: AnyLobe::nothing(),
-                curve,
-                site: p.site,
-                frame,
-                weight_in_top: lifted(p.weight_in_top),
-                alpha_o,
-                steps: p.steps,
-                inside: p.inside,
-                in_top,
-                delta: p.delta,
-                albedo: [L::zero(); 3],
-            });
-            let (Some(l), Some(site)) = (bsdf.lobes.last_mut(), site) else { return };
-            // Made where it stays, because there is room for the largest.
-            let albedos = P::prepare(p.kind, site, local, curve, in_top, &mut l.lobe);
-            let (bound, part) = l.weigh(local, [scale; 3], albedos);
+            let known = curves.at(p.site);
+            let (zero, lobe) = ([L::zero(); 3], AimedLobe::nothing());
+            bsdf.lobes.push(FlatLobe { share: lifted(*weight), albedo: zero, alpha_o, known, lobe });
+            let (Some(l), Some(site)) = (bsdf.lobes.last_mut(), &known.site) else { return };
+            // Made where it stays: what has just been stored in parts would have to be waited for.
+            let [albedo, bound] = P::prepare(*kind, site, local, &known.curve, p, &mut l.lobe);
+            total += l.weigh([scale; 3], albedo);
             if p.inside {
                 stack.lobe(p.weight_in_top, bound);
             }
-            total += part;
         }
         bsdf.share_out(total);
     }
 }
 
 impl Plan<f32> {
+    /// What the lobes do not keep of themselves, for eight points at once.
+    pub(crate) fn rests(&self, curves: &Curves<f32>, to: &mut Vec<AnyLobe<F32x8>>) {
+        let up = V3::new(F32x8([0.0; 8]), F32x8([0.0; 8]), F32x8([1.0; 8]));
+        to.clear();
+        to.extend(self.places.iter().zip(&self.lobes).filter_map(|(p, (kind, _))| {
+            let known = curves.at(p.site);
+            Some(AnyLobe::new(*kind, known.site.as_ref()?.values(), up, &known.curve))
+        }));
+    }
+
     /// [`turn`](Self::turn) at eight points: the bits of each.
     pub(crate) fn turn_eight<'m>(
         &'m self,
@@ -224,6 +216,7 @@ impl Plan<f32> {
         let packed = |each: [V3<f32>; 8]| V3::new(each.map(|v| v.x), each.map(|v| v.y), each.map(|v| v.z)).map(F32x8);
         let wo = packed(wo.map(|[x, y, z]| frame::normalize_or_zero(V3::new(x, y, z))));
         bsdf.reset(wo, packed(points.map(|globals| vector(globals.ng))), self.layering, self.depth);
+        bsdf.plan = Some(self);
         for axes in &self.frames {
             let each = points.map(|globals| axes.at::<f32>(globals));
             let frame =
@@ -235,15 +228,16 @@ impl Plan<f32> {
     }
 }
 
-/// How a lobe of known parameters is prepared for ωo. Gives what [`AnyLobe::albedos`] would.
+/// How a lobe of known parameters is prepared for ωo.
 trait Prepare<S: Scalar, L: Over<S>> {
+    /// Gives what [`AnyLobe::albedos`] would; in a top under `view` the second is [`AnyLobe::view_bound`].
     fn prepare(
         kind: LobeKind,
         site: &Site<S>,
         wo: V3<L>,
         curve: &AlbedoCurve<S>,
-        bound: bool,
-        to: &mut AnyLobe<L>,
+        place: &Place<S>,
+        to: &mut AimedLobe<L>,
     ) -> [Rgb<L>; 2];
 }
 
@@ -257,11 +251,13 @@ impl<S: Scalar, L: Over<S>> Prepare<S, L> for Made {
         site: &Site<S>,
         wo: V3<L>,
         curve: &AlbedoCurve<S>,
-        bound: bool,
-        to: &mut AnyLobe<L>,
+        place: &Place<S>,
+        to: &mut AimedLobe<L>,
     ) -> [Rgb<L>; 2] {
-        *to = AnyLobe::new(kind, site.values(), wo.apart(), curve);
-        to.albedos(wo, curve, bound)
+        let made = AnyLobe::new(kind, site.values(), wo.apart(), curve);
+        *to = AimedLobe::of(&made);
+        let [albedo, bound] = made.albedos(wo, curve, place.in_top);
+        [albedo, if place.of_view() { made.view_bound(wo, curve) } else { bound }]
     }
 }
 
@@ -275,13 +271,18 @@ impl<S: Scalar> Prepare<S, S> for Turned {
         site: &Site<S>,
         wo: V3<S>,
         curve: &AlbedoCurve<S>,
-        bound: bool,
-        to: &mut AnyLobe<S>,
+        place: &Place<S>,
+        to: &mut AimedLobe<S>,
     ) -> [Rgb<S>; 2] {
-        match site.turn(wo, curve, bound, to) {
-            Some(albedos) => albedos,
-            None => Made::prepare(kind, site, wo, curve, bound, to),
+        let Some([albedo, bound]) = site.turn(wo, curve, place.in_top, to) else {
+            return Made::prepare(kind, site, wo, curve, place, to);
+        };
+        if place.of_view() {
+            // As numbers: what comes from a call stays in memory.
+            let [r, g, b] = to.view_bound(Some(site.lobe()), wo.apart(), curve);
+            return [albedo, [r, g, b]];
         }
+        [albedo, bound]
     }
 }
 

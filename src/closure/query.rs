@@ -1,7 +1,8 @@
 //! What hosts ask of a BSDF besides `eval` and `sample`: what kind of scattering to expect, what light goes straight
 //! through, and what changes when light is traced instead of the view.
 
-use super::bsdf::{Bsdf, Eval, FlatLobe, Sample, finite, is_unit, vector};
+use super::bsdf::{Bsdf, Eval, Sample, finite, is_unit, vector};
+use super::met::Met;
 use crate::lobes::Rgb;
 use crate::optics::{Scalar, V3};
 use bitflags::bitflags;
@@ -60,11 +61,12 @@ impl<S: Scalar> Bsdf<'_, S> {
     /// Every kind of scattering that some lobe may show, as seen from its own side of its own normal.
     pub fn flags(&self) -> Scattering {
         let mut flags = Scattering::empty();
-        for l in &self.lobes {
-            let sides = l.lobe.sides();
+        for l in self.met() {
+            let lobe = l.whole();
+            let sides = lobe.sides();
             flags.set(Scattering::REFLECT, flags.contains(Scattering::REFLECT) || sides.reflect);
             flags.set(Scattering::TRANSMIT, flags.contains(Scattering::TRANSMIT) || sides.transmit);
-            flags |= kind(l.delta, l.lobe.roughness());
+            flags |= kind(l.place.delta, lobe.roughness());
         }
         let any = |c: Rgb<S>| c.iter().any(|x| *x > S::zero());
         flags.set(Scattering::NULL, any(self.transparency()));
@@ -74,7 +76,7 @@ impl<S: Scalar> Bsdf<'_, S> {
 
     /// Whether all lobes are delta lobes: `eval` is black everywhere, and a light sample is wasted. False for a black BSDF.
     pub fn is_delta(&self) -> bool {
-        !self.lobes.is_empty() && self.lobes.iter().all(|l| l.delta)
+        !self.lobes.is_empty() && self.places().iter().all(|p| p.delta)
     }
 
     /// Density over solid angle of [`sample`](Self::sample) choosing `wi`, all lobes together; delta lobes left out.
@@ -84,14 +86,14 @@ impl<S: Scalar> Bsdf<'_, S> {
         if !is_unit(wi) {
             return S::zero();
         }
-        let density = |l: &FlatLobe<'_, S>| l.share[3] * l.lobe.pdf(self.frames[l.frame as usize].to_local(wi));
-        finite(self.lobes.iter().fold(S::zero(), |sum, l| sum + density(l)))
+        let local = |l: &Met<'_, '_, S>| self.frames[l.place.frame as usize].to_local(wi);
+        finite(self.met().fold(S::zero(), |sum, l| sum + l.flat.probability() * l.pdf(local(&l))))
     }
 
     /// The part of the light that arrives along −ωo and goes straight on, per channel: what a shadow ray is multiplied
     /// by. Layers above dim it.
     pub fn transparency(&self) -> Rgb<S> {
-        if !self.lobes.iter().any(|l| l.delta) {
+        if !self.places().iter().any(|p| p.delta) {
             return [S::zero(); 3];
         }
         let straight = |wi: [S; 3]| -V3::new(wi[0], wi[1], wi[2]).dot(self.wo) > S::c(SAME);

@@ -6,12 +6,29 @@
 use super::walk::Stand;
 use crate::albedo::AlbedoCurve;
 use crate::lobes::registry::{LobeClass, ParamTy};
-use crate::lobes::{AnyLobe, LobeKind, Rgb, Rgb32};
+use crate::lobes::{AimedLobe, AnyLobe, LobeKind, Rgb, Rgb32};
 use crate::optics::{Scalar, V3};
+use std::sync::Arc;
+
+/// What is known of a site before shading.
+#[derive(Clone, Debug)]
+pub(crate) struct Known<S: Scalar> {
+    /// The table of its lobe.
+    pub curve: Arc<AlbedoCurve<S>>,
+    pub site: Option<Site<S>>,
+}
+
+impl<S: Scalar> Known<S> {
+    /// Its lobe, prepared for some ωo.
+    #[inline(always)]
+    pub fn lobe(&self) -> Option<&AnyLobe<S>> {
+        self.site.as_ref().map(Site::lobe)
+    }
+}
 
 /// A lobe whose parameters, but for directions, are known.
 #[derive(Clone, Debug)]
-pub(super) struct Site<S: Scalar> {
+pub(crate) struct Site<S: Scalar> {
     kind: LobeKind,
     /// Its block; 0 where a direction's slots are.
     values: Vec<f32>,
@@ -63,10 +80,16 @@ impl<S: Scalar> Site<S> {
         &self.values
     }
 
+    /// Prepared for some ωo.
+    #[inline(always)]
+    pub fn lobe(&self) -> &AnyLobe<S> {
+        &self.lobe
+    }
+
     /// Makes `to` the lobe for another ωo, if there is a shorter way than from its parameters. Gives what
     /// [`AnyLobe::albedos`] would.
     #[inline(always)]
-    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, bound: bool, to: &mut AnyLobe<S>) -> Option<[Rgb<S>; 2]> {
+    pub fn turn(&self, wo: V3<S>, curve: &AlbedoCurve<S>, bound: bool, to: &mut AimedLobe<S>) -> Option<[Rgb<S>; 2]> {
         self.lobe.turn(wo, curve, bound, to)
     }
 }
@@ -107,16 +130,24 @@ mod tests {
             assert!(site.is_of(kind, &values), "{kind:?}");
             for cos in [0.9f32, 0.3, 1e-3, -0.2] {
                 let wo = V3::polar(cos, 0.7);
-                let mut lobe = AnyLobe::nothing();
+                let made = AnyLobe::new(kind, &values, wo, &curve);
+                // What is kept of one, with the rest of another: as if nothing had been taken apart.
+                let mut lobe = AimedLobe::of(&made);
+                let whole = lobe.whole(Some(&site.lobe)).expect("of one kind");
+                assert_eq!(format!("{whole:?}"), format!("{made:?}"));
                 let Some(albedos) = site.turn(wo, &curve, true, &mut lobe) else { continue };
                 turned += 1;
-                let made = AnyLobe::new(kind, &values, wo, &curve);
                 assert_eq!(albedos, made.albedos(wo, &curve, true), "{kind:?} {values:?} {cos}");
                 for wi in [V3::polar(0.8, 2.0), V3::polar(0.05, -1.0), V3::polar(-0.4, 0.3)] {
-                    let [a, b] = [&lobe, &made].map(|l| l.evaluate(wi, &curve, true));
+                    let [a, b] =
+                        [lobe, AimedLobe::of(&made)].map(|l| l.evaluate(|| Some(&site.lobe), wi, &curve, true));
                     assert_eq!((a.f, a.pdf, a.bound), (b.f, b.pdf, b.bound), "{kind:?} {values:?} {cos} {wi:?}");
                 }
-                assert_eq!(lobe.sample([0.3, 0.6]), made.sample([0.3, 0.6]), "{kind:?} {values:?} {cos}");
+                assert_eq!(
+                    lobe.sample(|| Some(&site.lobe), [0.3, 0.6]),
+                    made.sample([0.3, 0.6]),
+                    "{kind:?} {values:?} {cos}"
+                );
             }
         }
         assert!(turned >= 4 * 8, "{turned}");

@@ -115,7 +115,7 @@ pub(super) fn walk<S: Scalar>(tree: &ClosureTree, visitor: &mut impl Visitor<S>)
 
 /// Where a lobe finds the directions its frame is made of.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stand {
+pub(crate) struct Stand {
     /// First slots of its normal and of its tangent, if it has its own.
     normal: Option<usize>,
     tangent: Option<usize>,

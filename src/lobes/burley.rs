@@ -76,6 +76,7 @@ impl<S: Real> Burley<S> {
 
 impl<S: Real> Lobe<S> for Burley<S> {
     type Params = BurleyParams;
+    type Aimed = Self;
 
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let spec = &BurleyParams::SPEC.params[2];

@@ -16,13 +16,11 @@
 //! for the `thread` lobe. u = exp(−(1 − cos φd)/σ²), σ = 20°, in place of a Gaussian in φd: the same to third order.
 //! The curve of offsets is replaced by [`TANGENTS`] tangents, each widened by the spread of those it stands for.
 
-use super::cloth_range;
-use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
+use super::cloth_family::{Family, FamilySeen};
 use super::registry::ClosureParams;
-use super::{Lobe, Rgb, Rgb32};
+use super::{Aimed, Lobe, Rgb, Rgb32};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKernel, FibreKey, FibreSpec, HORIZON, Ridges, TableSpec};
 use crate::optics::{F32x8, Lanes, Over, Real, V3, dispatch, lifted, rgb, sampling};
-use std::f64::consts::PI;
 use std::marker::PhantomData;
 
 /// Tangents per family.
@@ -88,213 +86,6 @@ pub const fn weights(curve: &[f64]) -> [f64; TANGENTS] {
     weights
 }
 
-/// The proposal for θi of one family: a ridge per tangent, taken as often as the tangent is seen.
-#[derive(Clone, Copy, Debug)]
-struct Proposal<S> {
-    /// Center of the first tangent's ridge, and the step to the next.
-    first: S,
-    step: S,
-    sigma: S,
-    /// How much of each tangent's whole distribution there is; what lies beyond ±π/2 is left out.
-    parts: [S; TANGENTS],
-}
-
-impl<S: Real> Proposal<S> {
-    fn at(&self, k: usize) -> Ridge<S> {
-        Ridge::new(self.step.mul_add(S::c(k as f64), self.first), self.sigma)
-    }
-
-    #[inline(always)]
-    fn pdf<L: Over<S>>(&self, theta: L) -> L {
-        let mut sum = L::zero();
-        for (k, part) in self.parts.iter().enumerate() {
-            let center = self.step.mul_add(S::c(k as f64), self.first);
-            sum += L::lift(*part) * Ridge::<S>::density(theta, L::lift(center), L::lift(self.sigma));
-        }
-        sum
-    }
-
-    fn sample(&self, u: S) -> S {
-        let mut rest = u;
-        let mut theta = -self.first;
-        let mut open = S::one();
-        for (k, part) in self.parts.iter().enumerate() {
-            let ridge = self.at(k);
-            let p = *part * ridge.span();
-            let inside = open.gt(S::zero()) & rest.lt(p);
-            theta = S::select(inside, ridge.sample((rest / p.max(S::c(1e-9))).clamp(S::zero(), S::one())), theta);
-            open = S::select(inside, S::zero(), open);
-            rest -= p;
-        }
-        theta
-    }
-}
-
-/// A family, prepared.
-#[derive(Clone, Copy, Debug)]
-struct Family<S> {
-    cylinder: Cylinder<S>,
-    /// Cosine and sine of the middle offset and of the step between offsets, in double precision: what turning by them
-    /// leaves of a direction near a tangent plane is a small difference.
-    middle: (f64, f64),
-    step: (f64, f64),
-    weights: &'static [f64; TANGENTS],
-    cover: S,
-    kd: S,
-    /// Reflectance at normal incidence.
-    head_on: S,
-    color: Rgb<S>,
-    ridges: Proposal<S>,
-    /// How often it is sampled.
-    share: S,
-    /// Which part of that is taken close to the horizon on ωo's side of the thread: where both directions graze the
-    /// thread on one side they are masked as one, and f·μ does not fall with the cosine. Signed as that side.
-    beside: S,
-}
-
-impl<S: Real> Family<S> {
-    /// `samples`: whether it is ever sampled; integrating needs no proposal.
-    fn new(yarn: &Yarn, share: f64, wo: V3<S>, samples: bool) -> Self {
-        let radians = |degrees: f32| S::c(degrees as f64 * PI / 180.0);
-        let turn = |degrees: f64| {
-            let (s, c) = degrees.to_radians().sin_cos();
-            (c, s)
-        };
-        let range = yarn.hi as f64 - yarn.lo as f64;
-        let step = radians(yarn.hi) - radians(yarn.lo);
-        let step = step * S::c(1.0 / (TANGENTS - 1) as f64);
-        // A tangent stands for an interval as wide as the step: a standard deviation of step/√12.
-        let spread = step * S::c(12f64.sqrt().recip());
-        // What comes from inside is most of it, and the wider.
-        let width = (yarn.gamma_v as f64).to_radians();
-        let sigma = 2.0 * width.hypot(range.to_radians() / ((TANGENTS - 1) as f64 * 12f64.sqrt()));
-        // An offset δ moves the ridge by −2δ.
-        let two = S::c(2.0);
-        let center = -(Around::new(wo).angle() + two * radians(yarn.lo));
-        let mut ridges =
-            Proposal { first: center, step: -(two * step), sigma: S::c(sigma), parts: yarn.weights.map(S::c) };
-        let (mut total, mut weight, mut all) = (S::c(1e-9), S::zero(), S::c(1e-9));
-        for k in 0..if samples { TANGENTS } else { 0 } {
-            let (sin, cos) = (radians(yarn.lo) + step * S::c(k as f64)).sin_cos();
-            let seen = (cos * wo.z - sin * wo.x).max(S::c(0.05));
-            // Steep threads, at 45° and more, have their cone about the normal: it is no ridge along this family.
-            let flat = (cos * cos - sin * sin).max(S::c(0.0));
-            ridges.parts[k] *= seen;
-            weight += ridges.parts[k] * flat;
-            all += ridges.parts[k];
-            ridges.parts[k] *= flat.max(S::c(1e-3));
-            total += ridges.parts[k] * ridges.at(k).span();
-        }
-        ridges.parts = ridges.parts.map(|p| p / total);
-        let o = Around::new(wo);
-        let beside = S::c(0.6) * (S::one() - o.pz.clamp(S::zero(), S::one())).sq();
-        Family {
-            cylinder: Cylinder::new(
-                S::from_f32(yarn.eta),
-                S::from_f32(yarn.gamma_s),
-                S::from_f32(yarn.gamma_v),
-                spread,
-            ),
-            middle: turn((yarn.lo as f64 + yarn.hi as f64) / 2.0),
-            step: turn(range / (TANGENTS - 1) as f64),
-            weights: yarn.weights,
-            cover: S::from_f32(yarn.cover),
-            kd: S::from_f32(yarn.kd),
-            head_on: ((S::from_f32(yarn.eta) - S::one()) / (S::from_f32(yarn.eta) + S::one())).sq(),
-            color: yarn.color.map(S::from_f32),
-            ridges,
-            share: S::c(0.75) * weight / all * S::c(share),
-            beside: S::select(o.py.lt(S::zero()), -beside, beside),
-        }
-    }
-
-    /// A direction in the thread's frame: φi with density ½ cos φi, or sin φi on ωo's side.
-    fn sample(&self, u: S, v: S) -> V3<S> {
-        let (theta, part) = (self.ridges.sample(u), self.beside.abs());
-        let beside = v.lt(part);
-        let rest = ((v - part) / (S::one() - part)).clamp(S::zero(), S::one());
-        let cosine = around_thread(theta, rest);
-        let low = S::one() - (v / part.max(S::c(1e-9))).clamp(S::zero(), S::one());
-        let cos = cosine.y.mul_add(cosine.y, cosine.z * cosine.z).sqrt();
-        let y = cos * (S::one() - low * low).safe_sqrt();
-        let y = S::select(self.beside.lt(S::zero()), -y, y);
-        V3::new(cosine.x, S::select(beside, y, cosine.y), S::select(beside, cos * low, cosine.z))
-    }
-
-    /// How many offsets there are, one where all threads are flat, and their cosines and sines.
-    #[inline(always)]
-    fn tangents(&self) -> (usize, [(f64, f64); TANGENTS]) {
-        // From the middle outward, so that no rounding tilts a tangent that lies flat.
-        let ((mid_cos, mid_sin), (one_cos, one_sin)) = (self.middle, self.step);
-        let (two_cos, two_sin) = (one_cos * one_cos - one_sin * one_sin, 2.0 * one_sin * one_cos);
-        let turn = |c: f64, s: f64| (mid_cos * c - mid_sin * s, mid_sin * c + mid_cos * s);
-        let tangents = [
-            turn(two_cos, -two_sin),
-            turn(one_cos, -one_sin),
-            self.middle,
-            turn(one_cos, one_sin),
-            turn(two_cos, two_sin),
-        ];
-        let count = if self.weights[1..].iter().all(|w| *w == 0.0) { 1 } else { TANGENTS };
-        (count, tangents)
-    }
-
-    /// Σ a·z⁺.
-    #[inline(always)]
-    fn seen<L: Over<S>>(&self, w: V3<L>) -> L {
-        let mut sum = L::zero();
-        let (count, tangents) = self.tangents();
-        for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
-            sum += L::lift(self.cover) * L::c(*weight) * turned(w, cos, sin).z.max(L::zero());
-        }
-        sum
-    }
-
-    /// Σ a·z⁺, and Σ a·z⁺·R for the surface and the volume, R what a tangent reflects at most; see [`cloth_range`].
-    #[inline(always)]
-    fn facing<L: Over<S>>(&self, w: V3<L>) -> [L; 3] {
-        let (head_on, kd) = (L::lift(self.head_on), L::lift(self.kd));
-        let mut sums = [L::zero(); 3];
-        let (count, tangents) = self.tangents();
-        for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
-            let w = turned(w, cos, sin);
-            let area = L::lift(self.cover) * L::c(*weight) * w.z.max(L::zero());
-            let across = w.y.mul_add(w.y, w.z * w.z).sqrt();
-            let (forward, even) = (cloth_range::forward(head_on, across), cloth_range::even(head_on, across));
-            sums[0] += area;
-            sums[1] += area * cloth_range::surface(head_on, across);
-            sums[2] += area * kd.mul_add(even - forward, forward);
-        }
-        sums
-    }
-
-    /// Adds Σ a·S·M to the surface and volume sums, and Σ a·z⁺ of ωi to `q`.
-    #[inline(always)]
-    fn add<L: Over<S>>(&self, wo: V3<L>, wi: V3<L>, surface: &mut L, volume: &mut L, q: &mut L) {
-        let (zero, kd) = (L::zero(), L::lift(self.kd));
-        let (count, tangents) = self.tangents();
-        for (weight, (cos, sin)) in self.weights[..count].iter().zip(tangents) {
-            let (lo, li) = (turned(wo, cos, sin), turned(wi, cos, sin));
-            let (o, i) = (Around::new(lo), Around::new(li));
-            let area = L::lift(self.cover) * L::c(*weight);
-            *q += area * li.z.max(zero);
-            let correlated = (L::c(-0.5 / (20.0 * PI / 180.0f64).powi(2)) * o.turn(i)).exp();
-            let apart = lo.z.max(zero) * li.z.max(zero);
-            let together = o.pz.min(i.pz).max(zero) * o.cos * i.cos;
-            let seen = area * correlated.mul_add(together - apart, apart);
-            let Parts { surface: s, forward, even } = self.cylinder.parts(o, i);
-            *surface += seen * s;
-            *volume += seen * kd.mul_add(even - forward, forward);
-        }
-    }
-}
-
-/// A direction where the tangent at this offset is x and its normal z.
-#[inline(always)]
-fn turned<L: Real>(w: V3<L>, cos: f64, sin: f64) -> V3<L> {
-    V3::new(w.x.turned(cos, w.z, sin), w.y, w.z.turned(cos, w.x, -sin))
-}
-
 /// Least Q: where no thread shows itself. Tiny, so that the cloth does not fade toward the horizon.
 const MIN_Q: f64 = 1e-12;
 /// The components of the tables.
@@ -306,14 +97,22 @@ const WEFT: usize = 2;
 #[derive(Clone, Copy, Debug)]
 pub struct Cloth<S> {
     families: [Family<S>; 2],
-    wo: V3<S>,
-    /// 1/Q(ωo) above the surface, else 0.
-    scale: S,
     /// What lies between the threads: 1 − a₁ − a₂.
     gap: S,
     /// Q(ω) is nowhere less than this times μ.
     level: S,
+    seen: ClothSeen<S>,
+}
+
+/// What of a [`Cloth`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct ClothSeen<S> {
+    wo: V3<S>,
+    /// 1/Q(ωo) above the surface, else 0.
+    scale: S,
+    /// max(1, E(ωo)) per channel.
     excess: Rgb<S>,
+    families: [FamilySeen<S>; 2],
 }
 
 /// The weft's thread coordinates: along y.
@@ -328,17 +127,6 @@ fn raised<R: Real>(w: V3<R>) -> V3<R> {
     V3::new(w.x, w.y, w.z.max(R::c(HORIZON)))
 }
 
-impl<S: Real> Family<S> {
-    /// Over solid angle, of sampling along the ridges, `w` in the family's frame.
-    #[inline(always)]
-    fn density<L: Over<S>>(&self, w: V3<L>) -> L {
-        let i = Around::new(w);
-        let beside = L::lift(self.beside);
-        let turn = (L::one() - beside.abs()).mul_add(L::c(0.5) * w.z, (beside * w.y).max(L::zero()));
-        self.ridges.pdf(i.angle()) * turn / i.cos.sq().max(L::c(1e-12))
-    }
-}
-
 impl<S: Real> Cloth<S> {
     pub fn new(yarns: &[Yarn; 2], wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         Self::prepare(yarns, wo, curve, true)
@@ -350,8 +138,7 @@ impl<S: Real> Cloth<S> {
         let covered = (yarns[0].cover + yarns[1].cover).max(1e-6);
         let sampled = |i: usize| (yarns[i].cover / covered) as f64;
         let share = |i: usize| Yarn { cover: (yarns[i].cover as f64 / total) as f32, ..yarns[i] };
-        let families =
-            [Family::new(&share(0), sampled(0), wo, samples), Family::new(&share(1), sampled(1), across(wo), samples)];
+        let families = [Family::new(&share(0)), Family::new(&share(1))];
         let gap = (S::one() - families[0].cover - families[1].cover).max(S::zero());
         let one = S::one();
         // Offsets in pairs ±δ give at least 2·cos δ·μ together; nothing is known of others.
@@ -361,13 +148,16 @@ impl<S: Real> Cloth<S> {
             families[i].cover * S::c(if symmetric(&yarns[i]) { cosines } else { 0.0 })
         };
         let level = (gap + level(0) + level(1)).max(S::c(1e-6));
-        let mut cloth = Cloth { families, wo, scale: one, gap, level, excess: [one; 3] };
+        let views = [wo, across(wo)];
+        let each = [0, 1].map(|i| families[i].seen_from(views[i], sampled(i), samples));
+        let seen = ClothSeen { wo, scale: one, excess: [one; 3], families: each };
+        let mut cloth = Cloth { families, gap, level, seen };
         let (_, _, q) = cloth.sums::<S>(wo);
-        cloth.scale = S::select(above, one / q, S::zero());
+        cloth.seen.scale = S::select(above, one / q, S::zero());
         // Integrating needs no division.
         let e = if samples { cloth.bounds(wo, curve) } else { [S::zero(); COMPONENTS] };
         for c in 0..3 {
-            cloth.excess[c] = cloth.mix(e, c).max(one);
+            cloth.seen.excess[c] = cloth.mix(e, c).max(one);
         }
         cloth
     }
@@ -375,7 +165,7 @@ impl<S: Real> Cloth<S> {
     /// The surface sum, the volume sums and Q(ωi).
     #[inline(always)]
     fn sums<L: Over<S>>(&self, wi: V3<L>) -> (L, [L; 2], L) {
-        let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
+        let (wo, wi) = (V3::<L>::lift(self.seen.wo), raised(wi));
         let mut q = L::lift(self.gap) * wi.z;
         let (mut surface, mut volume) = (L::zero(), [L::zero(); 2]);
         self.families[0].add(wo, wi, &mut surface, &mut volume[0], &mut q);
@@ -386,7 +176,7 @@ impl<S: Real> Cloth<S> {
     #[inline(always)]
     fn parts<L: Over<S>>(&self, wi: V3<L>) -> [L; COMPONENTS] {
         let (surface, volume, q) = self.sums(wi);
-        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale) / q, L::zero());
+        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.seen.scale) / q, L::zero());
         [surface * scale, volume[0] * scale, volume[1] * scale]
     }
 
@@ -394,13 +184,13 @@ impl<S: Real> Cloth<S> {
     #[inline(always)]
     fn part<L: Over<S>>(&self, family: usize, wi: V3<L>) -> [L; COMPONENTS] {
         let above = wi.z.gt(L::zero());
-        let (wo, wi) = (V3::<L>::lift(self.wo), raised(wi));
+        let (wo, wi) = (V3::<L>::lift(self.seen.wo), raised(wi));
         let views = [(wo, wi), (across(wo), across(wi))];
         let (mut surface, mut volume) = (L::zero(), L::zero());
         let mut q = L::lift(self.gap).mul_add(wi.z, self.families[1 - family].seen(views[1 - family].1));
         let (wo, turned) = views[family];
         self.families[family].add(wo, turned, &mut surface, &mut volume, &mut q);
-        let scale = L::select(above, L::lift(self.scale) / q.max(L::c(MIN_Q)), L::zero());
+        let scale = L::select(above, L::lift(self.seen.scale) / q.max(L::c(MIN_Q)), L::zero());
         let mut parts = [surface * scale, L::zero(), L::zero()];
         parts[WARP + family] = volume * scale;
         parts
@@ -428,19 +218,21 @@ impl<S: Real> Cloth<S> {
     #[inline(always)]
     pub fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         let (parts, e) = (self.parts(wi), self.bounds(wi, curve));
-        rgb!(c => self.mix(parts, c) / self.mix(e, c).max(L::lift(self.excess[c])))
+        rgb!(c => self.mix(parts, c) / self.mix(e, c).max(L::lift(self.seen.excess[c])))
     }
 
     /// Which part of the samples follows the families' ridges; the rest follows the cosine.
     #[inline(always)]
     fn shares(&self) -> [S; 2] {
-        [self.families[0].share, self.families[1].share]
+        [self.seen.families[0].share, self.seen.families[1].share]
     }
 
     #[inline(always)]
     pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let [a, b] = lifted::<_, L, 2>(self.shares());
-        let ridges = a * self.families[0].density(wi) + b * self.families[1].density(across(wi));
+        let ([warp, weft], wo) = (&self.seen.families, self.seen.wo);
+        let ridges =
+            a * self.families[0].density(wo, warp, wi) + b * self.families[1].density(across(wo), weft, across(wi));
         let even = (L::one() - a - b) * L::c(std::f64::consts::FRAC_1_PI);
         L::select(wi.z.gt(L::zero()), even.mul_add(wi.z, ridges), L::zero())
     }
@@ -452,7 +244,8 @@ impl<S: Real> Cloth<S> {
         let tiny = S::c(1e-9);
         let v = choose(u[0] / a.max(tiny), (u[0] - a) / b.max(tiny), (u[0] - a - b) / (S::one() - a - b));
         let v = v.clamp(S::zero(), S::one());
-        let [warp, weft] = [0, 1].map(|i| self.families[i].sample(v, u[1]));
+        let views = [self.seen.wo, across(self.seen.wo)];
+        let [warp, weft] = [0, 1].map(|i| self.families[i].sample(views[i], &self.seen.families[i], v, u[1]));
         let even = sampling::cosine_hemisphere([v, u[1]]);
         // The inverse of `across`.
         V3::new(choose(warp.x, -weft.y, even.x), choose(warp.y, weft.x, even.y), choose(warp.z, weft.z, even.z))
@@ -499,8 +292,24 @@ pub struct Woven<S, P> {
     params: PhantomData<P>,
 }
 
+impl<S: Real, P: ClothParams> Aimed<Woven<S, P>> for ClothSeen<S> {
+    #[inline(always)]
+    fn of(lobe: &Woven<S, P>) -> Self {
+        lobe.cloth.seen
+    }
+
+    #[inline(always)]
+    fn with<'a>(&self, rest: impl FnOnce() -> Option<&'a Woven<S, P>>) -> Option<Woven<S, P>>
+    where
+        Woven<S, P>: 'a,
+    {
+        rest().map(|rest| Woven { cloth: Cloth { seen: *self, ..rest.cloth }, ..*rest })
+    }
+}
+
 impl<S: Real, P: ClothParams> Lobe<S> for Woven<S, P> {
     type Params = P;
+    type Aimed = ClothSeen<S>;
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         P::table(values)

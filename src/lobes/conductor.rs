@@ -8,8 +8,9 @@
 //! Where this departs from the source: roughness is used as the width α of the slopes; the film is summed exactly at three
 //! wavelengths per channel.
 
+use super::lobe::keeps_that_of;
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_widths, metal_reflectance, widths};
+use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, ReflectorSeen, known_widths, metal_reflectance, widths};
 use super::{Evaluated, Lobe, Rgb};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
@@ -51,8 +52,11 @@ pub struct Conductor<S> {
     surface: Reflector<S>,
 }
 
+keeps_that_of!(Conductor { surface: ReflectorSeen });
+
 impl<S: Real> Lobe<S> for Conductor<S> {
     type Params = ConductorParams;
+    type Aimed = ReflectorSeen<S>;
 
     fn roughness(&self) -> S {
         self.surface.roughness()

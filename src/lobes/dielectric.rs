@@ -12,12 +12,12 @@
 //! the film is summed exactly at three wavelengths per channel. What bounces between facets under a film is given back as the
 //! channel that loses least has it; others may lose 0.3 %.
 
-use super::interface::{Interface, index};
-use super::lobe::apart;
-use super::pane::{self, Pane};
+use super::interface::{Interface, InterfaceSeen, by_interface, index};
+use super::lobe::{apart, keeps_one_of};
+use super::pane::{self, Pane, PaneSeen};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{DISTRIBUTIONS, Reflectance, coated_glass, known_thin, known_width, metal_reflectance, thin};
-use super::{Evaluated, Lobe, Rgb, Sides};
+use super::{Evaluated, Lobe, OneOf, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3};
@@ -67,8 +67,11 @@ pub enum Dielectric<S> {
 
 use Dielectric::{Solid, Thin};
 
+keeps_one_of!(Dielectric: Solid(InterfaceSeen<S>) | Thin(PaneSeen<S>));
+
 impl<S: Real> Lobe<S> for Dielectric<S> {
     type Params = DielectricParams;
+    type Aimed = OneOf<InterfaceSeen<S>, PaneSeen<S>>;
 
     fn sides(&self) -> Sides {
         match self {
@@ -125,13 +128,7 @@ impl<S: Real> Lobe<S> for Dielectric<S> {
         }
     }
 
-    #[inline(always)]
-    fn toward(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Option<Self> {
-        match self {
-            Solid(surface) => Some(Solid(surface.toward(wo, curve.facets()))),
-            Thin(_) => None,
-        }
-    }
+    by_interface!(First, Solid);
 
     #[inline(always)]
     fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {

@@ -26,13 +26,14 @@ pub struct Diffuse<S> {
 
 impl<S: Real> Diffuse<S> {
     /// Scatters nothing.
-    pub(super) fn black() -> Self {
+    pub(crate) fn black() -> Self {
         Diffuse { value: S::zero() }
     }
 }
 
 impl<S: Real> Lobe<S> for Diffuse<S> {
     type Params = DiffuseParams;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
         Some(Limits::above(cos, 1.0, 1.0))

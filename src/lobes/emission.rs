@@ -31,6 +31,7 @@ impl<S: Real> Emission<S> {
 
 impl<S: Real> Lobe<S> for Emission<S> {
     type Params = EmissionParams;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
         Some(Limits { lowest: 0.0, highest: 0.0 })

@@ -10,6 +10,7 @@
 //! horizon in place, mixed with a uniform share ([`super::ltc`]), where the paper clips one that does not.
 
 use super::limits::{Limits, SlotRange};
+use super::lobe::keeps_seen;
 use super::ltc::Ltc;
 use super::ltc_tables::EON;
 use super::registry::{ClosureParams, closure};
@@ -41,20 +42,28 @@ const C2: f64 = 2.0 / 3.0 - 28.0 / (15.0 * PI);
 /// See [`EonParams`].
 #[derive(Clone, Copy, Debug)]
 pub struct Eon<S> {
-    wo: V3<S>,
     rho: Rgb<S>,
     /// 1/(1 + C1·r), and r times that.
     a: S,
     b: S,
     roughness: S,
-    /// 1/π on the normal's side, else 0.
-    scale: S,
     /// Albedo of the repeated bounces.
     rho_ms: Rgb<S>,
+    seen: EonSeen<S>,
+}
+
+/// What of an [`Eon`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct EonSeen<S> {
+    wo: V3<S>,
+    /// 1/π on the normal's side, else 0.
+    scale: S,
     /// (1 − E(ωo))/(1 − mean E).
-    missing_o: S,
+    missing: S,
     ltc: Ltc<S>,
 }
+
+keeps_seen!(Eon, EonSeen);
 
 impl<S: Real> Eon<S> {
     /// The single-scattering albedo for white facets, A + (B/π)·G(μ).
@@ -88,6 +97,7 @@ impl<S: Real> Eon<S> {
 
 impl<S: Real> Lobe<S> for Eon<S> {
     type Params = EonParams;
+    type Aimed = EonSeen<S>;
 
     /// E = ρ·E₁ + ρms·(1 − E₁) with ρms = ρ²m/(1 − ρ(1 − m)) ≤ ρ: never above ρ.
     fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
@@ -106,41 +116,33 @@ impl<S: Real> Lobe<S> for Eon<S> {
         let lost = a * r * S::c(C1 - C2);
         let mean = S::one() - lost;
         let rho_ms = rho.map(|rho| rho.sq() * mean / (S::one() - rho * lost));
-        let lobe = Eon {
-            wo,
-            rho,
-            a,
-            b: a * r,
-            roughness: r,
-            scale: Self::on_side(wo.z, S::c(FRAC_1_PI)),
-            rho_ms,
-            missing_o: S::zero(),
-            ltc: Ltc::proposal(&EON, wo, r),
-        };
-        let missing = S::one() - lobe.single(wo.z);
-        Eon { missing_o: missing / lost.max(S::c(1e-6)), ..lobe }
+        let (zero, scale) = (S::zero(), Self::on_side(wo.z, S::c(FRAC_1_PI)));
+        let seen = EonSeen { wo, scale, missing: zero, ltc: Ltc::proposal(&EON, wo, r) };
+        let lobe = Eon { rho, a, b: a * r, roughness: r, rho_ms, seen };
+        let missing = (S::one() - lobe.single(wo.z)) / lost.max(S::c(1e-6));
+        Eon { seen: EonSeen { missing, ..seen }, ..lobe }
     }
 
     #[inline(always)]
     fn f<L: Over<S>>(&self, wi: V3<L>, _: &AlbedoCurve<S::Entry>) -> Rgb<L> {
-        let wo = V3::<L>::lift(self.wo);
+        let wo = V3::<L>::lift(self.seen.wo);
         let s = wo.x.mul_add(wi.x, wo.y * wi.y);
         let forward = s / wo.z.max(wi.z).max(L::c(1e-6));
         let s = L::select(s.gt(L::zero()), forward, s);
         // s ≥ −1 for unit vectors; longer ones must not turn f negative.
         let single = L::lift(self.a) * L::lift(self.roughness).mul_add(s, L::one()).max(L::zero());
-        let bounced = L::lift(self.missing_o) * (L::one() - self.single(wi.z));
-        let scale = Self::on_side(wi.z, L::lift(self.scale));
+        let bounced = L::lift(self.seen.missing) * (L::one() - self.single(wi.z));
+        let scale = Self::on_side(wi.z, L::lift(self.seen.scale));
         rgb!(c => scale * L::lift(self.rho[c]).mul_add(single, L::lift(self.rho_ms[c]) * bounced))
     }
 
     #[inline(always)]
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
-        self.ltc.pdf(wi)
+        self.seen.ltc.pdf(wi)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
-        self.ltc.sample(u)
+        self.seen.ltc.sample(u)
     }
 
     fn albedo(&self, w: V3<S>, _: &AlbedoCurve<S::Entry>) -> Rgb<S> {

@@ -152,6 +152,7 @@ impl<S: Real> Fabric<S> {
 
 impl<S: Real> Lobe<S> for Fabric<S> {
     type Params = FabricParams;
+    type Aimed = Self;
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let spec = FabricParams::SPEC;

@@ -7,6 +7,7 @@
 //! The bound is what the guarantee rests on. f is divided by max(1, Ē(ωo), Ē(ωi)), so a bound above 1 is allowed; one
 //! that is too low is not found out here, but by the audits.
 
+use super::lobe::keeps_seen;
 use super::registry::{Form, Layout, LobeClass, LobeSpec, ParamSpec, ParamTy};
 use super::{Evaluated, LobeKind, Rgb, Rgb32, Sides};
 use crate::optics::{Over, Real, V3, sampling};
@@ -297,10 +298,25 @@ impl fmt::Debug for HostKind {
 /// A host's lobe prepared for one ωo.
 #[derive(Clone, Copy, Debug)]
 pub struct Host<S> {
-    kind: HostKind,
     values: [f32; MAX_VALUES],
+    seen: HostSeen<S>,
+}
+
+/// What of a [`Host`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct HostSeen<S> {
+    kind: HostKind,
     wo: V3<S>,
 }
+
+impl<S> HostSeen<S> {
+    /// What it is.
+    pub(super) fn kind(&self) -> HostKind {
+        self.kind
+    }
+}
+
+keeps_seen!(Host, HostSeen);
 
 fn sane(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() { x } else { 0.0 }
@@ -317,27 +333,22 @@ impl<S: Real> Host<S> {
                 at += 1;
             }
         }
-        Host { kind, values, wo }
+        Host { values, seen: HostSeen { kind, wo } }
     }
 
     fn bound_at(&self, w: [f64; 3]) -> [f64; 3] {
-        self.kind.0.lobe.albedo_bound(&self.values, w).map(sane)
+        self.seen.kind.0.lobe.albedo_bound(&self.values, w).map(sane)
     }
 
     /// Calls `f` with ωo and ωi, lane by lane.
     #[inline(always)]
     fn lanes<L: Over<S>>(&self, wi: V3<L>, f: impl Fn([f64; 3], [f64; 3]) -> [f64; 3]) -> [L; 3] {
-        let wo = V3::<L>::lift(self.wo);
+        let wo = V3::<L>::lift(self.seen.wo);
         L::by_lane([wo.x, wo.y, wo.z, wi.x, wi.y, wi.z], |[a, b, c, x, y, z]| f([a, b, c], [x, y, z]))
     }
 }
 
 impl<S: Real> Host<S> {
-    /// What it is.
-    pub(super) fn kind(&self) -> HostKind {
-        self.kind
-    }
-
     #[inline(never)]
     pub(super) fn evaluate(&self, wi: V3<S>, bound: bool) -> Evaluated<S> {
         let bound = if bound { self.albedo_bound(wi) } else { [S::zero(); 3] };
@@ -348,7 +359,7 @@ impl<S: Real> Host<S> {
     #[inline(always)]
     pub fn f<L: Over<S>>(&self, wi: V3<L>) -> Rgb<L> {
         self.lanes(wi, |wo, wi| {
-            let f = self.kind.0.lobe.f(&self.values, wo, wi).map(sane);
+            let f = self.seen.kind.0.lobe.f(&self.values, wo, wi).map(sane);
             let (o, i) = (self.bound_at(wo), self.bound_at(wi));
             std::array::from_fn(|c| f[c] / o[c].max(i[c]).max(1.0))
         })
@@ -357,33 +368,33 @@ impl<S: Real> Host<S> {
     /// See [`super::Lobe::pdf`].
     #[inline(always)]
     pub fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
-        self.lanes(wi, |wo, wi| [sane(self.kind.0.lobe.pdf(&self.values, wo, wi)), 0.0, 0.0])[0]
+        self.lanes(wi, |wo, wi| [sane(self.seen.kind.0.lobe.pdf(&self.values, wo, wi)), 0.0, 0.0])[0]
     }
 
     /// See [`super::Lobe::sample`].
     pub fn sample(&self, u: [S; 2]) -> V3<S> {
-        let wo = self.wo;
+        let wo = self.seen.wo;
         let [x, y, z] = S::by_lane([wo.x, wo.y, wo.z, u[0], u[1]], |[a, b, c, u, v]| {
-            self.kind.0.lobe.sample(&self.values, [a, b, c], [u, v])
+            self.seen.kind.0.lobe.sample(&self.values, [a, b, c], [u, v])
         });
         V3::new(x, y, z)
     }
 
     /// See [`super::Lobe::sides`].
     pub fn sides(&self) -> Sides {
-        self.kind.0.lobe.sides()
+        self.seen.kind.0.lobe.sides()
     }
 
     /// See [`super::Lobe::roughness`].
     pub fn roughness(&self) -> S {
-        S::c(sane(self.kind.0.lobe.roughness(&self.values)).min(1.0))
+        S::c(sane(self.seen.kind.0.lobe.roughness(&self.values)).min(1.0))
     }
 
     /// See [`super::Lobe::albedo`].
     pub fn albedo(&self, w: V3<S>) -> Rgb<S> {
         S::by_lane([w.x, w.y, w.z], |w| {
             let bound = self.bound_at(w);
-            let albedo = self.kind.0.lobe.albedo(&self.values, w).map(sane);
+            let albedo = self.seen.kind.0.lobe.albedo(&self.values, w).map(sane);
             std::array::from_fn(|c| albedo[c].min(bound[c]).min(1.0))
         })
     }

@@ -31,6 +31,122 @@ impl Sides {
     }
 }
 
+/// What of a lobe depends on ωo.
+pub trait Aimed<B>: Copy + std::fmt::Debug {
+    /// Whether the rest is needed to make the lobe of it again.
+    const APART: bool = true;
+    /// Of a prepared lobe.
+    fn of(lobe: &B) -> Self;
+    /// The lobe again, where `rest` is one of the same parameters prepared for any other ωo: the same bits. `None` without
+    /// the rest.
+    fn with<'a>(&self, rest: impl FnOnce() -> Option<&'a B>) -> Option<B>
+    where
+        B: 'a;
+}
+
+impl<B: Copy + std::fmt::Debug> Aimed<B> for B {
+    const APART: bool = false;
+
+    #[inline(always)]
+    fn of(lobe: &B) -> B {
+        *lobe
+    }
+
+    #[inline(always)]
+    fn with<'a>(&self, _: impl FnOnce() -> Option<&'a B>) -> Option<B>
+    where
+        B: 'a,
+    {
+        Some(*self)
+    }
+}
+
+/// Says that a BSDF keeps the field `seen` of a lobe, or of what lobes are made of.
+macro_rules! keeps_seen {
+    ($Lobe:ident, $Seen:ident) => {
+        impl<S: $crate::optics::Real> $crate::lobes::Aimed<$Lobe<S>> for $Seen<S> {
+            #[inline(always)]
+            fn of(lobe: &$Lobe<S>) -> Self {
+                lobe.seen
+            }
+
+            #[inline(always)]
+            fn with<'a>(&self, rest: impl FnOnce() -> Option<&'a $Lobe<S>>) -> Option<$Lobe<S>>
+            where
+                $Lobe<S>: 'a,
+            {
+                rest().map(|rest| $Lobe { seen: *self, ..*rest })
+            }
+        }
+    };
+}
+
+pub(super) use keeps_seen;
+
+/// Says that a BSDF keeps of a lobe what it keeps of the one in a field.
+macro_rules! keeps_that_of {
+    ($Lobe:ident { $field:ident: $Seen:ident }) => {
+        impl<S: $crate::optics::Real> $crate::lobes::Aimed<$Lobe<S>> for $Seen<S> {
+            #[inline(always)]
+            fn of(lobe: &$Lobe<S>) -> Self {
+                $crate::lobes::Aimed::of(&lobe.$field)
+            }
+
+            #[inline(always)]
+            fn with<'a>(&self, rest: impl FnOnce() -> Option<&'a $Lobe<S>>) -> Option<$Lobe<S>>
+            where
+                $Lobe<S>: 'a,
+            {
+                let rest = rest()?;
+                let mut lobe = *rest;
+                lobe.$field = $crate::lobes::Aimed::with(self, || Some(&rest.$field))?;
+                Some(lobe)
+            }
+        }
+    };
+}
+
+pub(super) use keeps_that_of;
+
+/// What is kept of a lobe that is one of two things.
+#[derive(Clone, Copy, Debug)]
+pub enum OneOf<A, B> {
+    /// The first.
+    First(A),
+    /// The second.
+    Second(B),
+}
+
+/// Says so of an enum of two.
+macro_rules! keeps_one_of {
+    ($Lobe:ident: $First:ident($A:ty) | $Second:ident($B:ty)) => {
+        impl<S: $crate::optics::Real> $crate::lobes::Aimed<$Lobe<S>> for $crate::lobes::OneOf<$A, $B> {
+            #[inline(always)]
+            fn of(lobe: &$Lobe<S>) -> Self {
+                match lobe {
+                    $Lobe::$First(lobe) => $crate::lobes::OneOf::First($crate::lobes::Aimed::of(lobe)),
+                    $Lobe::$Second(lobe) => $crate::lobes::OneOf::Second($crate::lobes::Aimed::of(lobe)),
+                }
+            }
+
+            #[inline(always)]
+            fn with<'a>(&self, rest: impl FnOnce() -> Option<&'a $Lobe<S>>) -> Option<$Lobe<S>>
+            where
+                $Lobe<S>: 'a,
+            {
+                use $crate::lobes::{Aimed, OneOf};
+                match (self, rest()?) {
+                    (OneOf::First(kept), $Lobe::$First(rest)) => Aimed::with(kept, || Some(rest)).map($Lobe::$First),
+                    (OneOf::Second(kept), $Lobe::$Second(rest)) => Aimed::with(kept, || Some(rest)).map($Lobe::$Second),
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+pub(super) use keeps_one_of;
+
 /// One model of scattering, prepared for one ωo.
 ///
 /// All directions are unit vectors in the lobe's local frame, pointing away from the surface; z is the normal. The
@@ -38,6 +154,8 @@ impl Sides {
 pub trait Lobe<S: Real>: Sized + Copy {
     /// The declared parameters.
     type Params: ClosureParams;
+    /// What a BSDF keeps of it: the lobe itself, unless most of it is the same for every ωo.
+    type Aimed: Aimed<Self>;
 
     /// Which albedo table a parameter block needs; `values` holds `None` where the value is not known before shading.
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
@@ -111,6 +229,30 @@ pub trait Lobe<S: Real>: Sized + Copy {
         apart(self, wi, curve, bound)
     }
 
+    /// [`evaluate`](Lobe::evaluate) from what a BSDF keeps; black without the rest of it.
+    #[inline(always)]
+    fn evaluate_kept<'a, L: Over<S>>(
+        kept: &Self::Aimed,
+        rest: impl FnOnce() -> Option<&'a Self>,
+        wi: V3<L>,
+        curve: &AlbedoCurve<S::Entry>,
+        bound: bool,
+    ) -> Evaluated<L>
+    where
+        Self: 'a,
+    {
+        evaluate_again::<S, Self, L>(kept, rest, wi, curve, bound)
+    }
+
+    /// [`sample`](Lobe::sample) from what a BSDF keeps; no direction without the rest of it.
+    #[inline(always)]
+    fn sample_kept<'a>(kept: &Self::Aimed, rest: impl FnOnce() -> Option<&'a Self>, u: [S; 2]) -> V3<S>
+    where
+        Self: 'a,
+    {
+        sample_again(kept, rest, u)
+    }
+
     /// Density over solid angle of [`sample`](Lobe::sample) returning ωi.
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L;
 
@@ -159,6 +301,34 @@ pub trait Lobe<S: Real>: Sized + Copy {
     }
 }
 
+/// [`Lobe::evaluate`] of a lobe made again from what is kept of it.
+#[inline(always)]
+pub(super) fn evaluate_again<'a, S: Real, B: Lobe<S> + 'a, L: Over<S>>(
+    kept: &B::Aimed,
+    rest: impl FnOnce() -> Option<&'a B>,
+    wi: V3<L>,
+    curve: &AlbedoCurve<S::Entry>,
+    bound: bool,
+) -> Evaluated<L> {
+    match kept.with(rest) {
+        Some(lobe) => lobe.evaluate(wi, curve, bound),
+        None => Evaluated::black(),
+    }
+}
+
+/// [`Lobe::sample`] of a lobe made again.
+#[inline(always)]
+pub(super) fn sample_again<'a, S: Real, B: Lobe<S> + 'a>(
+    kept: &B::Aimed,
+    rest: impl FnOnce() -> Option<&'a B>,
+    u: [S; 2],
+) -> V3<S> {
+    match kept.with(rest) {
+        Some(lobe) => lobe.sample(u),
+        None => V3::new(S::zero(), S::zero(), S::zero()),
+    }
+}
+
 /// [`Lobe::evaluate`] of a lobe whose parts share nothing.
 #[inline(always)]
 pub(crate) fn apart<S: Real, L: Over<S>>(
@@ -181,6 +351,21 @@ pub struct Evaluated<L> {
     pub pdf: L,
     /// See [`Lobe::albedo_bound`]; 0 if it was not asked for.
     pub bound: Rgb<L>,
+}
+
+impl<L: Real> Evaluated<L> {
+    /// Of what scatters nothing.
+    #[inline(always)]
+    pub(super) fn black() -> Self {
+        Evaluated { f: [L::zero(); 3], pdf: L::zero(), bound: [L::zero(); 3] }
+    }
+
+    /// As numbers: what comes from a call stays in memory, and so does all that may stand in its place.
+    #[inline(always)]
+    pub(super) fn apart(self) -> Self {
+        let Evaluated { f: [r, g, b], pdf, bound: [x, y, z] } = self;
+        Evaluated { f: [r, g, b], pdf, bound: [x, y, z] }
+    }
 }
 
 /// The albedo of a lobe and, if it is asked for, its bound.

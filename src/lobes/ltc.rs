@@ -114,15 +114,15 @@ impl<S: Real> Ltc<S> {
     pub fn sample(&self, u: [S; 2]) -> V3<S> {
         let uniform = u[0].lt(self.uniform);
         // The number that made the choice is used again, stretched back to [0, 1).
-        let below = u[0] / self.uniform.max(S::c(1e-6));
-        let above = (u[0] - self.uniform) / (S::one() - self.uniform);
-        let again = S::select(uniform, below, above).clamp(S::zero(), S::c(0.999_999_94));
+        let (from, width) =
+            (S::select(uniform, S::zero(), self.uniform), S::select(uniform, self.uniform, S::one() - self.uniform));
+        let again = ((u[0] - from) / width.max(S::c(1e-6))).clamp(S::zero(), S::c(0.999_999_94));
         // Both maps turn by the same angle.
         let (cosine, flat) = sampling::cosine_and_uniform_hemisphere([again, u[1]]);
-        let x = (cosine.x - self.c * cosine.z) / self.a;
-        let y = cosine.y / self.b;
+        // M times it, without its length: times a·b.
+        let (x, y) = (self.b * (cosine.x - self.c * cosine.z), self.a * cosine.y);
         let [cos, sin] = self.turn;
-        let ltc = V3::new(cos * x - sin * y, sin * x + cos * y, cosine.z);
+        let ltc = V3::new(cos * x - sin * y, sin * x + cos * y, self.a * self.b * cosine.z);
         let ltc = ltc.scale(S::one() / ltc.length_squared().sqrt());
         let pick = |flat: S, ltc: S| S::select(uniform, flat, ltc);
         V3::new(pick(flat.x, ltc.x), pick(flat.y, ltc.y), pick(flat.z, ltc.z))

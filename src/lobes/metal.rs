@@ -6,8 +6,9 @@
 //! Where this departs from the source: reflectivity counts as at most 0.99; roughness is used as the width α of the slopes.
 
 use super::conductor::{Conductor, ConductorParams};
+use super::lobe::keeps_that_of;
 use super::registry::{ClosureParams, closure};
-use super::rough::widths;
+use super::rough::{ReflectorSeen, widths};
 use super::{Evaluated, Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3, fresnel};
@@ -45,8 +46,11 @@ pub struct Metal<S> {
     metal: Conductor<S>,
 }
 
+keeps_that_of!(Metal { metal: ReflectorSeen });
+
 impl<S: Real> Lobe<S> for Metal<S> {
     type Params = MetalParams;
+    type Aimed = ReflectorSeen<S>;
 
     fn roughness(&self) -> S {
         Lobe::roughness(&self.metal)

@@ -12,10 +12,11 @@
 //! kept in [1e-4, 1], and the finer one at 1/64 of the other or more. Beckmann facets are sampled as GGX facets of the
 //! same width, at weights below 1.5 near the peak.
 
-use super::interface::{Interface, index};
+use super::interface::{Interface, InterfaceSeen, by_interface, index};
+use super::lobe::keeps_one_of;
 use super::registry::{ClosureParams, LobeSpec, closure};
-use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, known_width, known_widths, widths};
-use super::{Evaluated, Lobe, Rgb, Sides};
+use super::rough::{DISTRIBUTIONS, Reflectance, Reflector, ReflectorSeen, known_width, known_widths, widths};
+use super::{Evaluated, Lobe, OneOf, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetSpec, white};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3};
@@ -57,6 +58,8 @@ pub enum Microfacet<S> {
 
 use Microfacet::{Glass, Mirror};
 
+keeps_one_of!(Microfacet: Mirror(ReflectorSeen<S>) | Glass(InterfaceSeen<S>));
+
 /// Whether an index and a mode ask for two media.
 fn two_media(eta: f32, refract: u32) -> bool {
     eta > 0.0 || refract > 0
@@ -64,6 +67,7 @@ fn two_media(eta: f32, refract: u32) -> bool {
 
 impl<S: Real> Lobe<S> for Microfacet<S> {
     type Params = MicrofacetParams;
+    type Aimed = OneOf<ReflectorSeen<S>, InterfaceSeen<S>>;
 
     fn sides(&self) -> Sides {
         match self {
@@ -111,6 +115,8 @@ impl<S: Real> Lobe<S> for Microfacet<S> {
             Mirror(Reflector::new(shape, alpha, Reflectance::White, wo, curve.facets()))
         }
     }
+
+    by_interface!(Second, Glass);
 
     #[inline(always)]
     fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {

@@ -17,6 +17,8 @@ mod charlie_terms;
 #[cfg(feature = "cloth")]
 mod cloth;
 #[cfg(feature = "cloth")]
+mod cloth_family;
+#[cfg(feature = "cloth")]
 mod cloth_range;
 #[cfg(feature = "microfacet")]
 pub mod conductor;
@@ -36,6 +38,7 @@ pub mod host;
 #[cfg(feature = "microfacet")]
 mod interface;
 pub mod limits;
+mod listed;
 mod lobe;
 mod ltc_tables;
 #[cfg(feature = "microfacet")]
@@ -58,6 +61,8 @@ mod rough;
 pub mod schlick;
 #[cfg(feature = "cloth")]
 pub mod sheen;
+#[cfg(feature = "cloth")]
+mod sheen_variant;
 pub mod signals;
 mod signatures;
 #[cfg(feature = "microfacet")]
@@ -75,8 +80,9 @@ pub mod ward;
 use crate::albedo::{AlbedoCurve, CurveSpec, TableSpec};
 use crate::optics::{Over, Real, V3};
 use limits::{Limits, SlotRange};
+pub(crate) use listed::{Listed, LobeVisitor, again, host_again};
 use lobe::albedos;
-pub use lobe::{Evaluated, Lobe, Sides};
+pub use lobe::{Aimed, Evaluated, Lobe, OneOf, Sides};
 use registry::{ClosureParams, LobeClass, LobeSpec};
 pub use signatures::forms;
 
@@ -92,26 +98,12 @@ fn turned<S: Real, T: Lobe<S>>(
     wo: V3<S>,
     curve: &AlbedoCurve<S::Entry>,
     bound: bool,
-    to: &mut AnyLobe<S>,
-    any: impl Fn(T) -> AnyLobe<S>,
+    to: &mut AimedLobe<S>,
+    any: impl Fn(T::Aimed) -> AimedLobe<S>,
 ) -> Option<[Rgb<S>; 2]> {
     let (turned, albedos) = lobe.seen(wo, curve, bound)?;
-    *to = any(turned);
+    *to = any(T::Aimed::of(&turned));
     Some(albedos)
-}
-
-/// Something to do with a lobe whose type is known.
-pub(crate) trait LobeVisitor<S: Real> {
-    /// A lobe of the list.
-    fn scattering<B: Lobe<S> + Listed<S>>(self, lobe: &B);
-    /// One that a host brought along.
-    fn host(self, lobe: &host::Host<S>);
-}
-
-/// A lobe of the list.
-pub(crate) trait Listed<S: Real>: Sized {
-    /// The lobe in its case, if it is of this kind.
-    fn listed(any: &AnyLobe<S>) -> Option<&Self>;
 }
 
 macro_rules! lobes {
@@ -218,8 +210,139 @@ macro_rules! lobes {
                         _ => None,
                     }
                 }
+                #[inline(always)]
+                fn kept(any: &AimedLobe<S>) -> Option<&Self::Aimed> {
+                    match any {
+                        AimedLobe::$Lobe(kept) => Some(kept),
+                        _ => None,
+                    }
+                }
             }
         )*
+
+        /// What a BSDF keeps of a lobe; `rest` is always one of the same parameters, if there is need of it.
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) enum AimedLobe<S: Real> {
+            $( $( #[cfg(feature = $family)] )? $Lobe(<$module::$Lobe<S> as Lobe<S>>::Aimed), )*
+            Host(host::HostSeen<S>),
+        }
+
+        impl<S: Real> AimedLobe<S> {
+            /// Of a prepared lobe.
+            pub fn of(lobe: &AnyLobe<S>) -> Self {
+                match lobe {
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => AimedLobe::$Lobe(Aimed::<$module::$Lobe<S>>::of(l)), )*
+                    AnyLobe::Host(l) => AimedLobe::Host(Aimed::of(l)),
+                }
+            }
+            /// What it is.
+            pub fn kind(&self) -> LobeKind {
+                match self { $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(_) => LobeKind::$Lobe, )* AimedLobe::Host(l) => LobeKind::Host(l.kind()) }
+            }
+            /// The lobe again. `None` without its rest.
+            #[inline(never)]
+            pub fn whole(&self, rest: Option<&AnyLobe<S>>) -> Option<AnyLobe<S>> {
+                match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again(l, || rest).map(AnyLobe::$Lobe), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(AnyLobe::Host),
+                }
+            }
+            /// What evaluating a BSDF needs of a lobe, in one call.
+            #[inline(always)]
+            pub fn evaluate<'a>(
+                &self,
+                rest: impl Fn() -> Option<&'a AnyLobe<S>>,
+                wi: V3<S>,
+                curve: &AlbedoCurve<S::Entry>,
+                bound: bool,
+            ) -> Evaluated<S> where S: 'a {
+                match self {
+                    AimedLobe::Diffuse(l) => diffuse::Diffuse::<S>::evaluate_kept(l, || rest().and_then(Listed::listed), wi, curve, bound),
+                    #[cfg(feature = "cloth")]
+                    AimedLobe::Sheen(l) => sheen::Sheen::<S>::evaluate_kept(l, || rest().and_then(Listed::listed), wi, curve, bound),
+                    AimedLobe::OrenNayar(l) => oren_nayar::OrenNayar::<S>::evaluate_kept(l, || rest().and_then(Listed::listed), wi, curve, bound),
+                    _ => self.evaluate_apart(rest(), wi.apart(), curve, bound).apart(),
+                }
+            }
+            /// Apart, so that a walk stays short whatever lobes there are.
+            #[inline(never)]
+            fn evaluate_apart(
+                &self,
+                rest: Option<&AnyLobe<S>>,
+                wi: V3<S>,
+                curve: &AlbedoCurve<S::Entry>,
+                bound: bool,
+            ) -> Evaluated<S> {
+                match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => <$module::$Lobe<S> as Lobe<S>>::evaluate_kept(l, || rest.and_then(Listed::listed), wi, curve, bound), )*
+                    AimedLobe::Host(l) => match host_again(l, || rest) {
+                        Some(l) => l.evaluate(wi, bound),
+                        None => Evaluated::black(),
+                    },
+                }
+            }
+            /// See [`Lobe::f`].
+            pub fn f(&self, rest: Option<&AnyLobe<S>>, wi: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
+                let f = match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again::<S, $module::$Lobe<S>>(l, || rest).map(|l| l.f(wi, curve)), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(|l| l.f(wi)),
+                };
+                f.unwrap_or([S::zero(); 3])
+            }
+            /// See [`Lobe::pdf`].
+            pub fn pdf(&self, rest: Option<&AnyLobe<S>>, wi: V3<S>) -> S {
+                let pdf = match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again::<S, $module::$Lobe<S>>(l, || rest).map(|l| Lobe::<S>::pdf(&l, wi)), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(|l| l.pdf(wi)),
+                };
+                pdf.unwrap_or(S::zero())
+            }
+            /// See [`Lobe::sample`].
+            #[inline(always)]
+            pub fn sample<'a>(&self, rest: impl Fn() -> Option<&'a AnyLobe<S>>, u: [S; 2]) -> V3<S> where S: 'a {
+                match self {
+                    AimedLobe::Diffuse(l) => diffuse::Diffuse::<S>::sample_kept(l, || rest().and_then(Listed::listed), u),
+                    #[cfg(feature = "cloth")]
+                    AimedLobe::Sheen(l) => sheen::Sheen::<S>::sample_kept(l, || rest().and_then(Listed::listed), u),
+                    AimedLobe::OrenNayar(l) => oren_nayar::OrenNayar::<S>::sample_kept(l, || rest().and_then(Listed::listed), u),
+                    _ => self.sample_apart(rest(), u).apart(),
+                }
+            }
+            #[inline(never)]
+            fn sample_apart(&self, rest: Option<&AnyLobe<S>>, u: [S; 2]) -> V3<S> {
+                match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => <$module::$Lobe<S> as Lobe<S>>::sample_kept(l, || rest.and_then(Listed::listed), u), )*
+                    AimedLobe::Host(l) => match host_again(l, || rest) {
+                        Some(l) => l.sample(u),
+                        None => V3::new(S::zero(), S::zero(), S::zero()),
+                    },
+                }
+            }
+            /// See [`Lobe::albedo_bound`].
+            pub fn albedo_bound(&self, rest: Option<&AnyLobe<S>>, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
+                let bound = match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again::<S, $module::$Lobe<S>>(l, || rest).map(|l| l.albedo_bound(w, curve)), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(|l| l.albedo_bound(w)),
+                };
+                bound.unwrap_or([S::zero(); 3])
+            }
+            /// See [`Lobe::view_bound`].
+            pub fn view_bound(&self, rest: Option<&AnyLobe<S>>, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
+                let bound = match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again::<S, $module::$Lobe<S>>(l, || rest).map(|l| l.view_bound(w, curve)), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(|l| l.albedo_bound(w)),
+                };
+                bound.unwrap_or([S::zero(); 3])
+            }
+            /// Tells `visitor` what it is. All of it in one place: what is called is not compiled for the processor's vectors.
+            #[inline(always)]
+            pub fn visit(&self, visitor: impl LobeVisitor<S>) {
+                match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(_) => visitor.scattering::<$module::$Lobe<S>>(), )*
+                    AimedLobe::Host(kept) => visitor.host(kept),
+                }
+            }
+        }
 
         impl<S: Real> AnyLobe<S> {
             /// See [`Lobe::new`]; `values` is the lobe's parameter block.
@@ -238,13 +361,13 @@ macro_rules! lobes {
                 wo: V3<S>,
                 curve: &AlbedoCurve<S::Entry>,
                 bound: bool,
-                to: &mut AnyLobe<S>,
+                to: &mut AimedLobe<S>,
             ) -> Option<[Rgb<S>; 2]> {
                 match self {
-                    AnyLobe::Diffuse(l) => turned(l, wo, curve, bound, to, AnyLobe::Diffuse),
+                    AnyLobe::Diffuse(l) => turned(l, wo, curve, bound, to, AimedLobe::Diffuse),
                     #[cfg(feature = "cloth")]
-                    AnyLobe::Sheen(l) => turned(l, wo, curve, bound, to, AnyLobe::Sheen),
-                    AnyLobe::OrenNayar(l) => turned(l, wo, curve, bound, to, AnyLobe::OrenNayar),
+                    AnyLobe::Sheen(l) => turned(l, wo, curve, bound, to, AimedLobe::Sheen),
+                    AnyLobe::OrenNayar(l) => turned(l, wo, curve, bound, to, AimedLobe::OrenNayar),
                     _ => {
                         // As numbers: what comes from a call stays in memory.
                         let [[a, b, c], [d, e, f]] = self.turn_apart(wo.apart(), curve, bound, to)?;
@@ -258,34 +381,18 @@ macro_rules! lobes {
                 wo: V3<S>,
                 curve: &AlbedoCurve<S::Entry>,
                 bound: bool,
-                to: &mut AnyLobe<S>,
+                to: &mut AimedLobe<S>,
             ) -> Option<[Rgb<S>; 2]> {
                 match self {
-                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => turned(l, wo, curve, bound, to, AnyLobe::$Lobe), )*
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => turned(l, wo, curve, bound, to, AimedLobe::$Lobe), )*
                     AnyLobe::Host(_) => None,
                 }
             }
-            /// What it is.
-            pub(crate) fn kind(&self) -> LobeKind {
-                match self { $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(_) => LobeKind::$Lobe, )* AnyLobe::Host(l) => LobeKind::Host(l.kind()) }
-            }
-            /// What evaluating a BSDF needs of a lobe, in one call.
-            #[inline(always)]
-            pub fn evaluate(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
+            /// Whether a BSDF keeps only a part of it.
+            pub(crate) fn is_kept_apart(&self) -> bool {
                 match self {
-                    AnyLobe::Diffuse(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
-                    #[cfg(feature = "cloth")]
-                    AnyLobe::Sheen(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
-                    AnyLobe::OrenNayar(l) => Lobe::<S>::evaluate(l, wi, curve, bound),
-                    _ => self.evaluate_apart(wi.apart(), curve, bound),
-                }
-            }
-            /// Apart, so that a walk stays short whatever lobes there are.
-            #[inline(never)]
-            fn evaluate_apart(&self, wi: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<S> {
-                match self {
-                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => Lobe::<S>::evaluate(l, wi, curve, bound), )*
-                    AnyLobe::Host(l) => l.evaluate(wi, bound),
+                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(_) => <<$module::$Lobe<S> as Lobe<S>>::Aimed as Aimed<$module::$Lobe<S>>>::APART, )*
+                    AnyLobe::Host(_) => true,
                 }
             }
             /// See [`Lobe::f`].
@@ -353,39 +460,33 @@ macro_rules! lobes {
                     }
                 }
             }
+        }
 
-            /// Of a sample: the index of refraction on ωi's side over that on ωo's, and [`roughness`](Self::roughness).
+        impl<S: Real> AimedLobe<S> {
+            /// Of a sample: the index of refraction on ωi's side over that on ωo's, and [`AnyLobe::roughness`].
             #[inline(always)]
-            pub(crate) fn crossing(&self, wi: V3<S>) -> (S, S) {
+            pub fn crossing<'a>(&self, rest: impl Fn() -> Option<&'a AnyLobe<S>>, wi: V3<S>) -> (S, S) where S: 'a {
                 match self {
-                    AnyLobe::Diffuse(_) => (S::one(), S::one()),
+                    AimedLobe::Diffuse(_) => (S::one(), S::one()),
                     #[cfg(feature = "cloth")]
-                    AnyLobe::Sheen(_) => (S::one(), S::one()),
-                    AnyLobe::OrenNayar(_) => (S::one(), S::one()),
-                    _ => self.crossing_apart(wi.apart()),
+                    AimedLobe::Sheen(_) => (S::one(), S::one()),
+                    AimedLobe::OrenNayar(_) => (S::one(), S::one()),
+                    _ => self.crossing_apart(rest(), wi.apart()),
                 }
             }
 
             #[inline(never)]
-            fn crossing_apart(&self, wi: V3<S>) -> (S, S) {
-                (S::one() / self.relative_eta(wi), self.roughness())
+            fn crossing_apart(&self, rest: Option<&AnyLobe<S>>, wi: V3<S>) -> (S, S) {
+                let crossing = match self {
+                    $( $( #[cfg(feature = $family)] )? AimedLobe::$Lobe(l) => again::<S, $module::$Lobe<S>>(l, || rest).map(|l| (S::one() / Lobe::<S>::relative_eta(&l, wi), Lobe::<S>::roughness(&l))), )*
+                    AimedLobe::Host(l) => host_again(l, || rest).map(|l| (S::one(), l.roughness())),
+                };
+                crossing.unwrap_or((S::one(), S::one()))
             }
 
             /// The smallest of them, black: until another takes its place.
-            pub(crate) fn nothing() -> Self {
-                AnyLobe::Diffuse(diffuse::Diffuse::black())
-            }
-        }
-
-        impl<S: Real> AnyLobe<S> {
-            /// Shows `visitor` the lobe as what it is. All of it in one place: what is called is not compiled for the
-            /// processor's vectors.
-            #[inline(always)]
-            pub(crate) fn visit(&self, visitor: impl LobeVisitor<S>) {
-                match self {
-                    $( $( #[cfg(feature = $family)] )? AnyLobe::$Lobe(l) => visitor.scattering(l), )*
-                    AnyLobe::Host(l) => visitor.host(l),
-                }
+            pub fn nothing() -> Self {
+                AimedLobe::Diffuse(diffuse::Diffuse::black())
             }
         }
     };

@@ -86,6 +86,7 @@ fn beyond_sine<L: Real>(sin: L, cos: L) -> L {
 
 impl<S: Real> Lobe<S> for OrenNayar<S> {
     type Params = OrenNayarParams;
+    type Aimed = Self;
 
     /// A falls and B rises with sigma; of the two parts of the sum the first falls with μ, the second is s(1 + s + s²)/
     /// (1 + s), rising with s, times μ.

@@ -5,11 +5,12 @@
 //!
 //! Where this departs from the source: without compensation the lobe is the bounded one of `oren_nayar`.
 
-use super::eon::{Eon, EonParams};
+use super::eon::{Eon, EonParams, EonSeen};
 use super::limits::{Limits, SlotRange};
+use super::lobe::keeps_one_of;
 use super::oren_nayar::{OrenNayar, OrenNayarParams};
 use super::registry::{ClosureParams, closure};
-use super::{Lobe, Rgb};
+use super::{Lobe, OneOf, Rgb};
 use crate::albedo::AlbedoCurve;
 use crate::optics::{Over, Real, V3};
 
@@ -41,8 +42,11 @@ pub enum OrenNayarDiffuse<S> {
 
 use OrenNayarDiffuse::{Kept, Single};
 
+keeps_one_of!(OrenNayarDiffuse: Single(OrenNayar<S>) | Kept(EonSeen<S>));
+
 impl<S: Real> Lobe<S> for OrenNayarDiffuse<S> {
     type Params = OrenNayarDiffuseParams;
+    type Aimed = OneOf<OrenNayar<S>, EonSeen<S>>;
 
     fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
         Some(Limits::above(cos, 0.0, 1.0))

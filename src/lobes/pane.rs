@@ -10,6 +10,7 @@
 //!
 //! Limit: a wall of an index below 1 is not stretched, two widths count as their geometric mean.
 
+use super::lobe::keeps_seen;
 use super::rough::{chance, largest, split, thin};
 use super::{Rgb, Sides};
 use crate::albedo::facets::{FacetKey, FacetTables};
@@ -33,27 +34,36 @@ pub(super) fn parts(key: &FacetKey, c: f64) -> [f64; 3] {
 /// A thin wall seen from one ωo.
 #[derive(Clone, Copy, Debug)]
 pub struct Pane<S> {
-    /// Folded to the side of the normal.
-    wo: V3<S>,
     facets: Facets<S>,
     /// η² − 1.
     m: S,
-    /// +1 if ωo is above, −1 below.
-    side: S,
-    reach: S,
-    proposal: S,
     tints: [Rgb<S>; 2],
-    /// M(ωo)/(π·M̄), for each side.
-    again: [S; 2],
     /// What is reflected of second bounces.
     shared: S,
-    /// Probability of an even direction, and of its being on the far side.
-    even: S,
+    /// Of even directions, the share on the far side.
     across: S,
     /// Largest channels of the tints.
     odds: [S; 2],
     sides: Sides,
+    seen: PaneSeen<S>,
 }
+
+/// What of a [`Pane`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct PaneSeen<S> {
+    /// Folded to the side of the normal.
+    wo: V3<S>,
+    /// +1 if ωo is above, −1 below.
+    side: S,
+    /// ℓ(ωo) of the surface and of the proposal.
+    reach: [S; 2],
+    /// M(ωo)/(π·M̄), for each side.
+    again: [S; 2],
+    /// Probability of an even direction.
+    even: S,
+}
+
+keeps_seen!(Pane, PaneSeen);
 
 impl<S: Real> Pane<S> {
     /// `eta` as [`super::interface::index`] gives it; tints for what is reflected and what passes.
@@ -78,28 +88,21 @@ impl<S: Real> Pane<S> {
         let tints = tints.map(|t| t.map(S::from_f32));
         let odds = tints.map(largest);
         let (back, on) = (shared * odds[0], (S::one() - shared) * odds[1]);
-        Pane {
+        let seen = PaneSeen {
             wo,
-            facets,
-            m,
             side,
-            reach: facets.reach(wo),
-            proposal: facets.proposal().reach(wo),
-            tints,
+            reach: facets.reaches(wo),
             again: [scale * shared, scale * (S::one() - shared)],
-            shared,
             even: missing * S::select((back + on).gt(S::zero()), S::one(), S::zero()),
-            across: on / (back + on).max(S::c(1e-30)),
-            odds,
-            sides,
-        }
+        };
+        Pane { facets, m, tints, shared, across: on / (back + on).max(S::c(1e-30)), odds, sides, seen }
     }
 
     /// ωi folded to the normal's side, and whether it lies on ωo's side, and whether on the other.
     #[inline(always)]
     fn folded<L: Over<S>>(&self, wi: V3<L>) -> (V3<L>, L::Mask, L::Mask) {
-        let lit = wi.z.abs().gt(L::zero()) & L::lift(self.wo.z).gt(L::zero());
-        let same = (wi.z * L::lift(self.side)).gt(L::zero());
+        let lit = wi.z.abs().gt(L::zero()) & L::lift(self.seen.wo.z).gt(L::zero());
+        let same = (wi.z * L::lift(self.seen.side)).gt(L::zero());
         (V3::new(wi.x, wi.y, wi.z.abs()), lit & same, lit & !same)
     }
 
@@ -115,13 +118,13 @@ impl<S: Real> Pane<S> {
     #[inline(always)]
     pub(super) fn f<L: Over<S>>(&self, wi: V3<L>, tables: &FacetTables<S::Entry>) -> Rgb<L> {
         let (wi, same, other) = self.folded(wi);
-        let wo = V3::<L>::lift(self.wo);
+        let wo = V3::<L>::lift(self.seen.wo);
         let h = wo + wi;
-        let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
+        let shadowed = wi.z.mul_add(L::lift(self.seen.reach[0]), wo.z * self.facets.reach(wi));
         let single = self.facets.d(h) * L::c(0.5) / shadowed.max(L::c(1e-18));
         let r = reflected(L::lift(self.m), L::c(0.5) * h.length_squared().sqrt());
         let missing = tables.missing(wi, self.facets.alpha());
-        let [back, on] = array(|k| L::lift(self.again[k]) * missing);
+        let [back, on] = array(|k| L::lift(self.seen.again[k]) * missing);
         let (back, on) = (r.mul_add(single, back), (L::one() - r).mul_add(single, on));
         rgb!(c => {
             let (back, on) = (L::lift(self.tints[0][c]) * back, L::lift(self.tints[1][c]) * on);
@@ -138,10 +141,10 @@ impl<S: Real> Pane<S> {
     #[inline(always)]
     pub(super) fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let (wi, same, other) = self.folded(wi);
-        let h = V3::<L>::lift(self.wo) + wi;
+        let h = V3::<L>::lift(self.seen.wo) + wi;
         let r = reflected(L::lift(self.m), L::c(0.5) * h.length_squared().sqrt());
-        let facet = self.facets.mirrored_pdf(h, L::lift(self.wo.z), L::lift(self.proposal));
-        let (even, across, back) = (L::lift(self.even), L::lift(self.across), self.chance(r));
+        let facet = self.facets.mirrored_pdf(h, L::lift(self.seen.wo.z), L::lift(self.seen.reach[1]));
+        let (even, across, back) = (L::lift(self.seen.even), L::lift(self.across), self.chance(r));
         let flat = even * sampling::cosine_hemisphere_pdf(wi.z);
         let facet = (L::one() - even) * facet;
         let back_pdf = facet.mul_add(back, flat * (L::one() - across));
@@ -150,16 +153,16 @@ impl<S: Real> Pane<S> {
     }
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
-        let (even, u1) = split(u[1], self.even);
+        let (even, u1) = split(u[1], self.seen.even);
         // The azimuth's digits below 2⁻¹² choose the side.
         let fine = u[0] * S::c(4096.0);
         let left = fine - fine.floor();
         let flat = sampling::cosine_hemisphere([u1, u[0]]);
-        let h = self.facets.visible(self.wo, [u[0], u1]);
-        let bright = mirror(self.wo, h);
-        let c = self.wo.dot(h) / h.length_squared().sqrt().max(S::c(1e-18));
+        let h = self.facets.visible(self.seen.wo, [u[0], u1]);
+        let bright = mirror(self.seen.wo, h);
+        let c = self.seen.wo.dot(h) / h.length_squared().sqrt().max(S::c(1e-18));
         let passes = S::select(even, self.across, S::one() - self.chance(reflected(self.m, c)));
-        let turn = S::select(left.lt(passes), -self.side, self.side);
+        let turn = S::select(left.lt(passes), -self.seen.side, self.seen.side);
         let pick = |a: S, b: S| S::select(even, a, b);
         // A facet may send light below the surface: no direction at all.
         let z = pick(flat.z, bright.z).max(S::zero());

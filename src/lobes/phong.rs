@@ -101,6 +101,7 @@ impl<S: Real> Phong<S> {
 
 impl<S: Real> Lobe<S> for Phong<S> {
     type Params = PhongParams;
+    type Aimed = Self;
 
     fn roughness(&self) -> S {
         self.place.sqrt()

@@ -6,6 +6,7 @@
 //! further facets F̃ = F̄²·Ē/(1 − F̄·(1 − Ē)) comes back, F̄ the mean of F over the hemisphere, Ē = 1 − M̄. Where nothing
 //! is known of E, M is 0 and the light is lost.
 
+use super::lobe::keeps_seen;
 use super::registry::LobeSpec;
 use super::{Evaluated, Rgb};
 use crate::albedo::facets::{FacetKey, FacetTables, MAX_STRETCH, MIN_ALPHA, PARTS};
@@ -186,19 +187,26 @@ impl<S: Real> Reflectance<S> {
 /// A rough reflecting surface seen from one ωo.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflector<S> {
-    wo: V3<S>,
     facets: Facets<S>,
     reflectance: Reflectance<S>,
-    /// ℓ(ωo) of the surface and of the proposal.
-    reach: S,
-    proposal: S,
-    /// F̃/(π·M̄)·M(ωo).
-    again: Rgb<S>,
     /// F̃.
     kept: Rgb<S>,
+    seen: ReflectorSeen<S>,
+}
+
+/// What of a [`Reflector`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct ReflectorSeen<S> {
+    wo: V3<S>,
+    /// ℓ(ωo) of the surface and of the proposal.
+    reach: [S; 2],
+    /// F̃/(π·M̄)·M(ωo).
+    again: Rgb<S>,
     /// Probability of a cosine-distributed direction.
     even: S,
 }
+
+keeps_seen!(Reflector, ReflectorSeen);
 
 impl<S: Real> Reflector<S> {
     pub(super) fn new(
@@ -210,20 +218,12 @@ impl<S: Real> Reflector<S> {
     ) -> Self {
         let alpha = widths(alpha).map(S::from_f32);
         let facets = Facets::new(shape, alpha);
-        let (missing, reach) = (tables.missing(wo, alpha), facets.reach(wo));
+        let missing = tables.missing(wo, alpha);
         let mean = tables.mean_missing(false, alpha);
         let kept = reflectance.mean().map(|f| f * f * (S::one() - mean) / (S::one() - f * mean).max(S::c(1e-6)));
         let scale = S::c(FRAC_1_PI) * missing / mean.max(S::c(1e-30));
-        Reflector {
-            wo,
-            facets,
-            reflectance,
-            reach,
-            proposal: if facets.is_proposal() { reach } else { facets.proposal().reach(wo) },
-            again: kept.map(|k| k * scale),
-            kept,
-            even: missing * kept[0].max(kept[1]).max(kept[2]),
-        }
+        let (again, even) = (kept.map(|k| k * scale), missing * largest(kept));
+        Reflector { facets, reflectance, kept, seen: ReflectorSeen { wo, reach: facets.reaches(wo), again, even } }
     }
 
     pub(super) fn roughness(&self) -> S {
@@ -252,29 +252,29 @@ impl<S: Real> Reflector<S> {
     /// f, where `missing` is what the tables say at ωi, and the density.
     #[inline(always)]
     fn scattered<L: Over<S>>(&self, wi: V3<L>, missing: L) -> (Rgb<L>, L) {
-        let wo = V3::<L>::lift(self.wo);
+        let wo = V3::<L>::lift(self.seen.wo);
         let h = wo + wi;
-        let shadowed = wi.z.mul_add(L::lift(self.reach), wo.z * self.facets.reach(wi));
-        let (d, facet) = self.facets.d_and_mirrored_pdf(h, wo.z, L::lift(self.proposal));
+        let shadowed = wi.z.mul_add(L::lift(self.seen.reach[0]), wo.z * self.facets.reach(wi));
+        let (d, facet) = self.facets.d_and_mirrored_pdf(h, wo.z, L::lift(self.seen.reach[1]));
         let single = d * L::c(0.5) / shadowed.max(L::c(1e-18));
         let c = L::c(0.5) * h.length_squared().sqrt();
         // 1 − c² is the square of half the difference.
         let fall = L::c(0.25) * (wo - wi).length_squared() / (L::one() + c);
         let part = self.reflectance.at(c, fall);
-        let even = L::lift(self.even);
+        let even = L::lift(self.seen.even);
         let pdf = (L::one() - even).mul_add(facet, even * sampling::cosine_hemisphere_pdf(wi.z));
         let lit = wo.z.gt(L::zero()) & wi.z.gt(L::zero());
         let f = rgb!(c => {
-            let f = part[c].mul_add(single, L::lift(self.again[c]) * missing);
+            let f = part[c].mul_add(single, L::lift(self.seen.again[c]) * missing);
             L::select(lit, f, L::zero())
         });
         (f, L::select(lit, pdf, L::zero()))
     }
 
     pub(super) fn sample(&self, u: [S; 2]) -> V3<S> {
-        let (even, again) = split(u[1], self.even);
+        let (even, again) = split(u[1], self.seen.even);
         let flat = sampling::cosine_hemisphere([again, u[0]]);
-        let bright = mirror(self.wo, self.facets.visible(self.wo, [u[0], again]));
+        let bright = mirror(self.seen.wo, self.facets.visible(self.seen.wo, [u[0], again]));
         V3::new(S::select(even, flat.x, bright.x), S::select(even, flat.y, bright.y), S::select(even, flat.z, bright.z))
     }
 

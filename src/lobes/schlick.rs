@@ -11,13 +11,15 @@
 //!
 //! Where this departs from the source: roughness is used as the width α of the slopes. What bounces between facets is divided between reflection and refraction as for clear glass, whatever the colors.
 
-use super::interface::{Interface, index};
+use super::interface::{Interface, InterfaceSeen, by_interface, index};
 use super::limits::{Limits, SlotRange};
+use super::lobe::{keeps_one_of, keeps_that_of};
 use super::registry::{ClosureParams, LobeSpec, closure};
 use super::rough::{
-    DISTRIBUTIONS, Reflectance, Reflector, coated_glass, known_width, known_widths, metal_reflectance, widths,
+    DISTRIBUTIONS, Reflectance, Reflector, ReflectorSeen, coated_glass, known_width, known_widths, metal_reflectance,
+    widths,
 };
-use super::{Evaluated, Lobe, Rgb, Sides};
+use super::{Evaluated, Lobe, OneOf, Rgb, Sides};
 use crate::albedo::facets::{Facet, FacetKey, FacetSpec};
 use crate::albedo::{AlbedoCurve, TableSpec};
 use crate::optics::{Over, Real, V3, rgb};
@@ -62,13 +64,23 @@ const SPEC: &LobeSpec = GeneralizedSchlickParams::SPEC;
 /// See [`GeneralizedSchlickParams`].
 #[derive(Clone, Copy, Debug)]
 pub enum GeneralizedSchlick<S> {
-    /// Reflects, times the tint.
-    Coat(Reflector<S>, Rgb<S>),
+    /// Reflects.
+    Coat(Tinted<S>),
     /// Between two media.
     Glass(Interface<S>),
 }
 
 use GeneralizedSchlick::{Coat, Glass};
+
+/// A reflecting surface times a color.
+#[derive(Clone, Copy, Debug)]
+pub struct Tinted<S> {
+    surface: Reflector<S>,
+    tint: Rgb<S>,
+}
+
+keeps_that_of!(Tinted { surface: ReflectorSeen });
+keeps_one_of!(GeneralizedSchlick: Coat(ReflectorSeen<S>) | Glass(InterfaceSeen<S>));
 
 /// For tables: the key holds F0, F90 and the exponent.
 fn schlick_reflectance(key: &FacetKey, c: f64) -> [f64; 3] {
@@ -117,17 +129,18 @@ fn transmits(tint: [f32; 3]) -> bool {
 
 impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     type Params = GeneralizedSchlickParams;
+    type Aimed = OneOf<ReflectorSeen<S>, InterfaceSeen<S>>;
 
     fn sides(&self) -> Sides {
         match self {
-            Coat(..) => Sides::REFLECT,
+            Coat(_) => Sides::REFLECT,
             Glass(surface) => surface.scattered_to(),
         }
     }
 
     fn roughness(&self) -> S {
         match self {
-            Coat(surface, _) => surface.roughness(),
+            Coat(coat) => coat.surface.roughness(),
             Glass(surface) => surface.roughness(),
         }
     }
@@ -181,14 +194,16 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
             Glass(Interface::new(shape, alpha, (index_of(params.f0), Some(curved)), tints, wo, curve.facets()))
         } else {
             let surface = Reflector::new(shape, alpha, curved, wo, curve.facets());
-            Coat(surface, params.reflection_tint.map(S::from_f32))
+            Coat(Tinted { surface, tint: params.reflection_tint.map(S::from_f32) })
         }
     }
+
+    by_interface!(Second, Glass);
 
     #[inline(always)]
     fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
-            Coat(surface, tint) => tinted(tint, surface.f(wi, curve.facets())),
+            Coat(Tinted { surface, tint }) => tinted(tint, surface.f(wi, curve.facets())),
             Glass(surface) => surface.f(wi, curve.facets()),
         }
     }
@@ -196,21 +211,21 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     #[inline(always)]
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
-            Coat(surface, _) => surface.pdf(wi),
+            Coat(coat) => coat.surface.pdf(wi),
             Glass(surface) => surface.pdf(wi),
         }
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
         match self {
-            Coat(surface, _) => surface.sample(u),
+            Coat(coat) => coat.surface.sample(u),
             Glass(surface) => surface.sample(u),
         }
     }
 
     fn albedo(&self, w: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Rgb<S> {
         match self {
-            Coat(surface, tint) => tinted(tint, surface.albedo(w, curve.facets())),
+            Coat(Tinted { surface, tint }) => tinted(tint, surface.albedo(w, curve.facets())),
             Glass(surface) => surface.albedo(w, curve.facets()),
         }
     }
@@ -218,7 +233,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     #[inline(always)]
     fn albedo_bound<L: Over<S>>(&self, w: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
         match self {
-            Coat(surface, tint) => tinted(tint, surface.albedo_bound(w, curve.facets())),
+            Coat(Tinted { surface, tint }) => tinted(tint, surface.albedo_bound(w, curve.facets())),
             Glass(surface) => surface.albedo_bound(w, curve.facets()),
         }
     }
@@ -226,7 +241,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     #[inline(always)]
     fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
         match self {
-            Coat(surface, tint) => {
+            Coat(Tinted { surface, tint }) => {
                 let e = surface.evaluate(wi, curve.facets(), bound);
                 Evaluated { f: tinted(tint, e.f), bound: tinted(tint, e.bound), ..e }
             }
@@ -237,7 +252,7 @@ impl<S: Real> Lobe<S> for GeneralizedSchlick<S> {
     #[inline(always)]
     fn relative_eta<L: Over<S>>(&self, wi: V3<L>) -> L {
         match self {
-            Coat(..) => L::one(),
+            Coat(_) => L::one(),
             Glass(surface) => surface.relative_eta(wi),
         }
     }

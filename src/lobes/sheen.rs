@@ -26,10 +26,10 @@
 //! uniform share ([`super::ltc`]), at a fifth of the variance on average (`tests/lobes/sampling.rs` prints the table).
 
 use super::charlie::{self, ExactLambda, Fibres, FittedLambda};
-use super::lobe::apart;
+use super::lobe::{apart, evaluate_again, keeps_seen};
 use super::ltc::{self, Ltc};
-use super::ltc_tables::{SHEEN, SOFTENED, ZELTNER};
 use super::registry::{Build, ClosureParams, Form, ParamSpec, SlotSource, closure};
+use super::sheen_variant::Variant::{self, CharlieV, Exact, Fitted, Refit, RefitSoftened, Softened, Zeltner};
 use super::{Evaluated, Lobe, LobeKind, Rgb};
 use crate::albedo::curve::Extra;
 use crate::albedo::{AlbedoCurve, Axis, Cells, CurveSpec};
@@ -119,88 +119,15 @@ pub(super) const FORMS: &[Form] = &[
 /// Cosines below this are taken as this inside the fitted Λ and in its denominator.
 const MIN_COS: f64 = 1e-4;
 
-/// One model with its switches thrown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Variant {
-    Softened,
-    Fitted,
-    RefitSoftened,
-    Refit,
-    Exact,
-    CharlieV,
-    Zeltner,
-}
-
-use Variant::{CharlieV, Exact, Fitted, Refit, RefitSoftened, Softened, Zeltner};
-
-impl Variant {
-    const ALL: [Variant; 7] = [Softened, Fitted, RefitSoftened, Refit, Exact, CharlieV, Zeltner];
-
-    /// From the slot values of `mode`, `model` and `softening`.
-    fn of(mode: u32, model: u32, softening: u32) -> Variant {
-        let model = if model == 0 { [1, 5][mode.min(1) as usize] } else { model };
-        match (model, softening) {
-            (1, 0) => Fitted,
-            (1, _) => Softened,
-            (2, 0) => Refit,
-            (2, _) => RefitSoftened,
-            (3, _) => Exact,
-            (4, _) => CharlieV,
-            _ => Zeltner,
-        }
-    }
-
-    /// The smallest roughness; lower ones are taken as this.
-    fn floor(self) -> f64 {
-        match self {
-            Softened | Fitted => 0.07,
-            RefitSoftened | Refit | CharlieV => 0.02,
-            Exact => charlie::MIN_ROUGHNESS,
-            Zeltner => 0.05,
-        }
-    }
-
-    /// What it is sampled by; under `zeltner` also what it is.
-    fn table(self) -> &'static ltc::Table {
-        match self {
-            Softened | RefitSoftened => &SOFTENED,
-            Fitted | Refit | Exact | CharlieV => &SHEEN,
-            Zeltner => &ZELTNER,
-        }
-    }
-
-    /// The one whose bit is set, if it is the only one.
-    fn only(mask: u32) -> Option<Variant> {
-        if mask.is_power_of_two() { Variant::ALL.get(mask.trailing_zeros() as usize).copied() } else { None }
-    }
-
-    fn reciprocal(self) -> bool {
-        matches!(self, Fitted | Refit | Exact | CharlieV)
-    }
-
-    /// Whether E exceeds 1 for some angle at some roughness from `roughness` up.
-    fn gains(self, roughness: f64) -> bool {
-        match self {
-            Softened | Fitted | RefitSoftened | Refit | Exact => false,
-            CharlieV => roughness < 0.205,
-            Zeltner => true,
-        }
-    }
-}
-
 /// Shadowing by the fitted Λ.
 #[derive(Clone, Copy, Debug)]
-struct FittedFor<S> {
+struct Fit<S> {
     fit: FittedLambda<S>,
-    /// 1 + Λ(ωo).
-    lambda_o: S,
-    /// 1/(4·μo).
-    scale: S,
     /// 2 with softening and 0 without.
     soften: S,
 }
 
-impl<S: Real> FittedFor<S> {
+impl<S: Real> Fit<S> {
     /// Λ toward the viewer, which is never softened, and the albedo there if it is at hand.
     #[inline(always)]
     fn lambda_o(&self, wo: V3<S>, known: Known<'_, S::Entry>) -> (S, Option<S>) {
@@ -226,20 +153,13 @@ impl<S: Real> FittedFor<S> {
     }
 }
 
-/// How fibres hide each other, prepared for ωo.
+/// How fibres hide each other.
 #[derive(Clone, Copy, Debug)]
 enum Shadowing<S> {
-    Fitted(FittedFor<S>),
-    /// μo·Λ(ωo).
-    Exact {
-        exact: ExactLambda<S>,
-        cos_lambda_o: S,
-    },
+    Fitted(Fit<S>),
+    Exact(ExactLambda<S>),
     Visibility,
-    /// The albedo the transformed cosine is scaled by.
-    Transformed {
-        albedo: S,
-    },
+    Transformed,
 }
 
 /// See [`SheenParams`].
@@ -248,70 +168,117 @@ pub struct Sheen<S> {
     fibres: Fibres<S>,
     /// Where a table over the roughness has to be read.
     roughness: S,
-    wo: V3<S>,
     shadowing: Shadowing<S>,
+    seen: SheenSeen<S>,
+}
+
+/// What of a [`Sheen`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct SheenSeen<S> {
+    wo: V3<S>,
+    /// Fitted: 1 + Λ(ωo). Exact: μo·Λ(ωo). Of a transformed cosine: the albedo it is scaled by.
+    hidden: S,
+    /// Fitted: 1/(4·μo).
+    scale: S,
     /// What is sampled; under `zeltner` also the lobe.
     ltc: Ltc<S>,
     /// The curve's excess at ωo.
     excess: S,
 }
 
+keeps_seen!(Sheen, SheenSeen);
+
+impl<S: Real> SheenSeen<S> {
+    /// `f` where both directions lie above the surface, else 0.
+    #[inline(always)]
+    fn above<L: Over<S>>(&self, wi: V3<L>, f: L) -> L {
+        L::select(L::lift(self.wo.z).gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
+    }
+
+    /// D over ωo and ωi from cells, if they may be read.
+    #[inline(always)]
+    fn d<L: Over<S>>(&self, wi: V3<L>, cells: &Cells) -> Option<L> {
+        charlie::read_d(cells, charlie::half_sin2(V3::<L>::lift(self.wo), wi))
+    }
+
+    /// f of the fitted models.
+    #[inline(always)]
+    fn fitted<L: Over<S>>(&self, wi: V3<L>, d: L, lambda_i: L) -> L {
+        let sum = fitted_cosine(wi) * (L::lift(self.hidden) + lambda_i);
+        self.above(wi, d * L::lift(self.scale) / sum)
+    }
+
+    /// All at once where there are cells, which only fitted models have.
+    #[inline(always)]
+    fn evaluate<L: Over<S>>(&self, wi: V3<L>, cells: Option<&Cells>, bound: bool) -> Option<Evaluated<L>> {
+        let cells = cells?;
+        let (lambda, most) = charlie::read_light(cells, fitted_cosine(wi))?;
+        let f = self.fitted(wi, self.d(wi, cells)?, lambda);
+        let bound = if bound { lit(wi, most) } else { L::zero() };
+        Some(Evaluated { f: [f; 3], pdf: self.ltc.pdf(wi), bound: [bound; 3] })
+    }
+}
+
 impl<S: Real> Sheen<S> {
     fn prepare(variant: Variant, roughness: S, wo: V3<S>, known: Known<'_, S::Entry>) -> Self {
         let r = roughness.clamp(S::c(variant.floor()), S::one());
-        let fitted = |fit: FittedLambda<S>, soften: f64| {
-            let (lambda_o, scale) = (S::one(), S::one());
-            Shadowing::Fitted(FittedFor { fit, lambda_o, scale, soften: S::c(soften) })
-        };
+        let fitted = |fit: FittedLambda<S>, soften: f64| Shadowing::Fitted(Fit { fit, soften: S::c(soften) });
         let shadowing = match variant {
             Softened => fitted(FittedLambda::published(r), 2.0),
             Fitted => fitted(FittedLambda::published(r), 0.0),
             RefitSoftened => fitted(FittedLambda::refitted(r), 2.0),
             Refit => fitted(FittedLambda::refitted(r), 0.0),
-            Exact => Shadowing::Exact { exact: ExactLambda::new(r), cos_lambda_o: S::zero() },
+            Exact => Shadowing::Exact(ExactLambda::new(r)),
             CharlieV => Shadowing::Visibility,
-            Zeltner => Shadowing::Transformed { albedo: S::zero() },
+            Zeltner => Shadowing::Transformed,
         };
         let params = match known.row {
             [] => ltc::read(variant.table(), wo.z, r),
             row => ltc::read_row(row, wo.z),
         };
-        let ltc = Ltc::new([S::one(), S::one(), S::zero(), S::one()], wo);
-        Sheen { fibres: Fibres::new(r), roughness: r, wo, shadowing, ltc, excess: S::one() }.aimed(wo, params, known).0
+        let (one, ltc) = (S::one(), Ltc::new([S::one(), S::one(), S::zero(), S::one()], wo));
+        let seen = SheenSeen { wo, hidden: one, scale: one, ltc, excess: one };
+        Sheen { fibres: Fibres::new(r), roughness: r, shadowing, seen }.aimed(wo, params, known).0
     }
 
     /// Turned toward ωo, where its transformed cosine has the parameters `params`; and its albedo there if it is at hand.
     #[inline(always)]
     fn aimed(self, wo: V3<S>, params: [S; ltc::PARAMS], known: Known<'_, S::Entry>) -> (Self, Option<S>) {
         let [a, b, c, share] = params;
-        let (mut uniform, mut albedo) = (share, None);
-        let shadowing = match self.shadowing {
+        let (mut uniform, mut scale, mut albedo) = (share, S::one(), None);
+        let hidden = match &self.shadowing {
             Shadowing::Fitted(fitted) => {
                 let (lambda, at_hand) = fitted.lambda_o(wo, known);
                 albedo = at_hand;
-                let lambda_o = S::one() + lambda;
-                Shadowing::Fitted(FittedFor { lambda_o, scale: S::c(0.25) / fitted_cosine(wo), ..fitted })
+                scale = S::c(0.25) / fitted_cosine(wo);
+                S::one() + lambda
             }
-            Shadowing::Exact { exact, .. } => {
-                let cos_lambda_o = exact.cos_lambda(unit_cosine(wo), sin2(wo), known.terms);
-                Shadowing::Exact { exact, cos_lambda_o }
-            }
-            Shadowing::Visibility => Shadowing::Visibility,
-            Shadowing::Transformed { .. } => {
+            Shadowing::Exact(exact) => exact.cos_lambda(unit_cosine(wo), sin2(wo), known.terms),
+            Shadowing::Visibility => S::one(),
+            Shadowing::Transformed => {
                 uniform = S::zero();
-                Shadowing::Transformed { albedo: share }
+                share
             }
         };
-        (Sheen { wo, shadowing, ltc: Ltc::new([a, b, c, uniform], wo), ..self }, albedo)
+        let seen = SheenSeen { wo, hidden, scale, ltc: Ltc::new([a, b, c, uniform], wo), excess: S::one() };
+        (Sheen { seen, ..self }, albedo)
+    }
+
+    /// With what is to be divided by where the curve asks for it.
+    #[inline(always)]
+    fn dividing(self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
+        let excess = curve.excess(wo, self.roughness);
+        Sheen { seen: SheenSeen { excess, ..self.seen }, ..self }
     }
 
     /// f(ωo, ωi), eq. 1 with F = 1, before it is bounded.
     #[inline(always)]
     fn value<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         match &self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, self.d(wi, known), fitted.lambda_i(wi, known)),
+            Shadowing::Fitted(fitted) => self.seen.fitted(wi, self.d(wi, known), fitted.lambda_i(wi, known)),
             _ if L::WIDE => self.value_of_any(wi, known),
-            _ => self.value_apart(wi, known),
+            // Of a copy: what is called wants it in memory.
+            _ => Self::value_apart(&{ *self }, wi, known),
         }
     }
 
@@ -325,61 +292,48 @@ impl<S: Real> Sheen<S> {
     fn value_of_any<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
         let d = self.d(wi, known);
         match &self.shadowing {
-            Shadowing::Fitted(fitted) => self.fitted(fitted, wi, d, fitted.lambda_i(wi, known)),
-            Shadowing::Exact { exact, cos_lambda_o } => self.exact(*exact, *cos_lambda_o, wi, d, known.terms),
+            Shadowing::Fitted(fitted) => self.seen.fitted(wi, d, fitted.lambda_i(wi, known)),
+            Shadowing::Exact(exact) => self.exact(*exact, wi, d, known.terms),
             Shadowing::Visibility => self.visible(wi, d),
-            Shadowing::Transformed { albedo } => self.transformed(*albedo, wi),
+            Shadowing::Transformed => self.transformed(wi),
         }
     }
 
     /// D over ωo and ωi.
     #[inline(always)]
     fn d<L: Over<S>>(&self, wi: V3<L>, known: Known<'_, S::Entry>) -> L {
-        let wo = V3::<L>::lift(self.wo);
         if let Some(cells) = known.cells
-            && let Some(d) = charlie::read_d(cells, charlie::half_sin2(wo, wi))
+            && let Some(d) = self.seen.d(wi, cells)
         {
             return d;
         }
-        self.fibres.d(charlie::half_cot2(wo, wi))
-    }
-
-    /// `f` where both directions lie above the surface, else 0.
-    #[inline(always)]
-    fn above<L: Over<S>>(&self, wi: V3<L>, f: L) -> L {
-        L::select(L::lift(self.wo.z).gt(L::zero()) & wi.z.gt(L::zero()), f, L::zero())
+        self.fibres.d(charlie::half_cot2(V3::<L>::lift(self.seen.wo), wi))
     }
 
     #[inline(always)]
-    fn fitted<L: Over<S>>(&self, fitted: &FittedFor<S>, wi: V3<L>, d: L, lambda_i: L) -> L {
-        let FittedFor { lambda_o, scale, .. } = *fitted;
-        self.above(wi, d * L::lift(scale) / (fitted_cosine(wi) * (L::lift(lambda_o) + lambda_i)))
-    }
-
-    #[inline(always)]
-    fn exact<L: Over<S>>(&self, exact: ExactLambda<S>, cos_lambda_o: S, wi: V3<L>, d: L, terms: &[S::Entry]) -> L {
+    fn exact<L: Over<S>>(&self, exact: ExactLambda<S>, wi: V3<L>, d: L, terms: &[S::Entry]) -> L {
         // 4·μo·μi·(1 + Λo + Λi), multiplied out: finite and accurate at the horizon.
-        let cos_o = L::lift(self.wo.z);
+        let cos_o = L::lift(self.seen.wo.z);
         let cos_lambda_i = exact.cos_lambda(unit_cosine(wi), sin2(wi), terms);
-        let sum = cos_o * (wi.z + cos_lambda_i) + wi.z * L::lift(cos_lambda_o);
-        self.above(wi, d * L::c(0.25) / sum.max(L::c(1e-30)))
+        let sum = cos_o * (wi.z + cos_lambda_i) + wi.z * L::lift(self.seen.hidden);
+        self.seen.above(wi, d * L::c(0.25) / sum.max(L::c(1e-30)))
     }
 
     #[inline(always)]
     fn visible<L: Over<S>>(&self, wi: V3<L>, d: L) -> L {
-        self.above(wi, d * charlie::visibility(L::lift(self.wo.z), wi.z))
+        self.seen.above(wi, d * charlie::visibility(L::lift(self.seen.wo.z), wi.z))
     }
 
     #[inline(always)]
-    fn transformed<L: Over<S>>(&self, albedo: S, wi: V3<L>) -> L {
-        self.above(wi, L::lift(albedo) * self.ltc.density_over_cos(wi))
+    fn transformed<L: Over<S>>(&self, wi: V3<L>) -> L {
+        self.seen.above(wi, L::lift(self.seen.hidden) * self.seen.ltc.density_over_cos(wi))
     }
 
     /// A value divided by what the lobe would gain at either direction.
     #[inline(always)]
     fn kept<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, value: L) -> Rgb<L> {
         if curve.divides() {
-            let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.excess));
+            let excess = curve.excess(wi, L::lift(self.roughness)).max(L::lift(self.seen.excess));
             [value / excess; 3]
         } else {
             [value; 3]
@@ -419,7 +373,7 @@ impl<S: Real> Sheen<S> {
     fn cells(key: &[f64; 4], view: &dyn Fn(f64) -> f64, bound: &dyn Fn(f64) -> f64) -> Option<Cells> {
         let variant = Variant::only(key[1] as u32)?;
         let lobe = Sheen::<f64>::prepare(variant, key[0], V3::new(0.0, 0.0, 1.0), NOTHING);
-        let Shadowing::Fitted(FittedFor { fit, soften, .. }) = lobe.shadowing else { return None };
+        let Shadowing::Fitted(Fit { fit, soften }) = lobe.shadowing else { return None };
         charlie::cells((&lobe.fibres, &fit, soften), MIN_COS, view, bound)
     }
 }
@@ -469,6 +423,7 @@ fn sin2<L: Real>(w: V3<L>) -> L {
 
 impl<S: Real> Lobe<S> for Sheen<S> {
     type Params = SheenParams;
+    type Aimed = SheenSeen<S>;
 
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let spec = SheenParams::SPEC;
@@ -515,7 +470,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
     fn new(params: &SheenParams, wo: V3<S>, curve: &AlbedoCurve<S::Entry>) -> Self {
         let variant = Variant::of(params.mode, params.model, params.softening);
         let lobe = Sheen::prepare(variant, S::from_f32(params.roughness), wo, Known::of(curve));
-        Sheen { excess: curve.excess(wo, lobe.roughness), ..lobe }
+        lobe.dividing(wo, curve)
     }
 
     #[inline(always)]
@@ -525,12 +480,12 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn seen(&self, wo: V3<S>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Option<(Self, [Rgb<S>; 2])> {
-        let (known, excess) = (Known::of(curve), curve.excess(wo, self.roughness));
+        let known = Known::of(curve);
         if known.row.is_empty() {
             return None;
         }
         let (aimed, albedo) = self.aimed(wo, ltc::read_row(known.row, wo.z), known);
-        let lobe = Sheen { excess, ..aimed };
+        let lobe = aimed.dividing(wo, curve);
         let albedo = match albedo {
             Some(albedo) => [albedo; 3],
             None => lobe.albedo(wo, curve),
@@ -546,24 +501,45 @@ impl<S: Real> Lobe<S> for Sheen<S> {
 
     #[inline(always)]
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
-        self.ltc.pdf(wi)
+        self.seen.ltc.pdf(wi)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
-        self.ltc.sample(u)
+        self.seen.ltc.sample(u)
     }
 
     #[inline(always)]
     fn evaluate<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>, bound: bool) -> Evaluated<L> {
-        if let Some(cells) = curve.cells()
-            && let Shadowing::Fitted(fitted) = &self.shadowing
-            && let Some((lambda, most)) = charlie::read_light(cells, fitted_cosine(wi))
-        {
-            let f = self.fitted(fitted, wi, self.d(wi, Known::of(curve)), lambda);
-            let bound = if bound { lit(wi, most) } else { L::zero() };
-            return Evaluated { f: [f; 3], pdf: self.pdf(wi), bound: [bound; 3] };
+        if let Some(evaluated) = self.seen.evaluate(wi, curve.cells(), bound) {
+            return evaluated;
         }
         apart(self, wi, curve, bound)
+    }
+
+    /// Without the rest where there are cells.
+    #[inline(always)]
+    fn evaluate_kept<'a, L: Over<S>>(
+        kept: &SheenSeen<S>,
+        rest: impl FnOnce() -> Option<&'a Self>,
+        wi: V3<L>,
+        curve: &AlbedoCurve<S::Entry>,
+        bound: bool,
+    ) -> Evaluated<L>
+    where
+        Self: 'a,
+    {
+        if let Some(evaluated) = kept.evaluate(wi, curve.cells(), bound) {
+            return evaluated;
+        }
+        evaluate_again::<S, Self, L>(kept, rest, wi, curve, bound)
+    }
+
+    #[inline(always)]
+    fn sample_kept<'a>(kept: &SheenSeen<S>, _: impl FnOnce() -> Option<&'a Self>, u: [S; 2]) -> V3<S>
+    where
+        Self: 'a,
+    {
+        kept.ltc.sample(u)
     }
 
     #[inline(always)]
@@ -589,7 +565,7 @@ impl<S: Real> Lobe<S> for Sheen<S> {
         }
         let bound = curve.bound(w, L::lift(self.roughness));
         // E_light integrates over the kinks of the fitted table, which the baking resolves to 1e-4 only.
-        let slack = if matches!(self.shadowing, Shadowing::Transformed { .. }) { 2e-4 } else { 0.0 };
+        let slack = if matches!(self.shadowing, Shadowing::Transformed) { 2e-4 } else { 0.0 };
         [L::select(w.z.gt(L::zero()), (bound + L::c(slack)).min(L::one().max(bound)), bound); 3]
     }
 }

@@ -94,6 +94,7 @@ impl SignalParams for DebugParams {
 
 impl<S: Real, P: SignalParams> Lobe<S> for Silent<S, P> {
     type Params = P;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
         Some(Limits { lowest: 0.0, highest: 0.0 })

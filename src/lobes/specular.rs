@@ -74,6 +74,7 @@ impl<S: Real> Reflection<S> {
 
 impl<S: Real> Lobe<S> for Reflection<S> {
     type Params = ReflectionParams;
+    type Aimed = Self;
 
     fn roughness(&self) -> S {
         S::zero()
@@ -132,6 +133,7 @@ impl<S: Real> Refraction<S> {
 
 impl<S: Real> Lobe<S> for Refraction<S> {
     type Params = RefractionParams;
+    type Aimed = Self;
 
     fn sides(&self) -> Sides {
         Sides::TRANSMIT

@@ -99,6 +99,7 @@ impl<S: Real> Subsurface<S> {
 
 impl<S: Real> Lobe<S> for Subsurface<S> {
     type Params = SubsurfaceParams;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], cos: (f64, f64)) -> Option<Limits> {
         Some(Limits::above(cos, 1.0, 1.0))

@@ -15,6 +15,7 @@
 
 use super::cylinder::{Around, Cylinder, Parts, Ridge, around_thread};
 use super::limits::{self, Limits, SlotRange};
+use super::lobe::keeps_seen;
 use super::registry::{ClosureParams, closure};
 use super::{Lobe, Rgb};
 use crate::albedo::{AlbedoCurve, COMPONENTS, FibreKey, FibreSpec, TableSpec};
@@ -59,20 +60,28 @@ const MIN_COS: f64 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub struct Thread<S> {
     cylinder: Cylinder<S>,
-    o: Around<S>,
-    /// 1 above the surface, else 0.
-    scale: S,
     /// A·(1 − kd) and A·kd.
     forward: Rgb<S>,
     even: Rgb<S>,
+    /// The varying parameter's place in the table.
+    place: S,
+    seen: ThreadSeen<S>,
+}
+
+/// What of a [`Thread`] depends on ωo.
+#[derive(Clone, Copy, Debug)]
+pub struct ThreadSeen<S> {
+    o: Around<S>,
+    /// 1 above the surface, else 0.
+    scale: S,
     /// max(1, E(ωo)) per channel.
     excess: Rgb<S>,
     /// Proposals for the surface and forward parts, and how often each is taken; the rest follows the cosine.
     ridges: [Ridge<S>; 2],
     shares: [S; 2],
-    /// The varying parameter's place in the table.
-    place: S,
 }
+
+keeps_seen!(Thread, ThreadSeen);
 
 /// The index in [eta, gamma_s, gamma_v] of the only one that is `None`.
 fn varying(values: &[Option<f32>]) -> Result<Option<usize>, ()> {
@@ -128,6 +137,7 @@ impl<S: Real> Thread<S> {
 
 impl<S: Real> Lobe<S> for Thread<S> {
     type Params = ThreadParams;
+    type Aimed = ThreadSeen<S>;
 
     fn table(values: &[Option<f32>]) -> Option<TableSpec> {
         let spec = ThreadParams::SPEC;
@@ -187,35 +197,37 @@ impl<S: Real> Lobe<S> for Thread<S> {
         let a = p.A.map(S::from_f32);
         let mut lobe = Thread {
             cylinder: Cylinder::new(eta, gamma_s, gamma_v, zero),
-            o,
-            scale: S::select(wo.z.gt(zero), one, zero),
             forward: a.map(|a| a * (one - kd)),
             even: a.map(|a| a * kd),
-            excess: [one; 3],
-            ridges: [ridge(gamma_s), ridge(gamma_v)],
-            shares: [zero; 2],
+            seen: ThreadSeen {
+                o,
+                scale: S::select(wo.z.gt(zero), one, zero),
+                excess: [one; 3],
+                ridges: [ridge(gamma_s), ridge(gamma_v)],
+                shares: [zero; 2],
+            },
             place: curve.fibre().axis_index().map_or(zero, |i| places[i.min(2)]),
         };
         let e = lobe.bounds(wo, curve);
         for c in 0..3 {
-            lobe.excess[c] = lobe.mix(e, c).max(one);
+            lobe.seen.excess[c] = lobe.mix(e, c).max(one);
         }
         let seen = if curve.fibre().is_empty() { [0.05, 0.7, 0.5].map(S::c) } else { e };
         let mean = |x: Rgb<S>| (x[0] + x[1] + x[2]) * S::c(1.0 / 3.0);
         let parts = [seen[SURFACE], seen[FORWARD] * mean(lobe.forward), seen[EVEN] * mean(lobe.even)];
         // A tenth follows the cosine in any case: it bounds the weights.
         let total = S::c(0.9) / (parts[0] + parts[1] + parts[2]).max(S::c(1e-9));
-        lobe.shares = [parts[0] * total, parts[1] * total];
+        lobe.seen.shares = [parts[0] * total, parts[1] * total];
         lobe
     }
 
     #[inline(always)]
     fn f<L: Over<S>>(&self, wi: V3<L>, curve: &AlbedoCurve<S::Entry>) -> Rgb<L> {
-        let Parts { surface, forward, even } = self.cylinder.parts(Around::<L>::lift(self.o), Around::new(wi));
+        let Parts { surface, forward, even } = self.cylinder.parts(Around::<L>::lift(self.seen.o), Around::new(wi));
         let e = self.bounds(wi, curve);
-        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.scale), L::zero());
+        let scale = L::select(wi.z.gt(L::zero()), L::lift(self.seen.scale), L::zero());
         rgb!(c => {
-            let excess = self.mix(e, c).max(L::lift(self.excess[c]));
+            let excess = self.mix(e, c).max(L::lift(self.seen.excess[c]));
             scale * self.mix([surface, forward, even], c) / excess
         })
     }
@@ -225,22 +237,22 @@ impl<S: Real> Lobe<S> for Thread<S> {
     fn pdf<L: Over<S>>(&self, wi: V3<L>) -> L {
         let i = Around::new(wi);
         let theta = i.angle();
-        let [a, b] = lifted::<_, L, 2>(self.shares);
-        let ridges = a * self.ridges[0].pdf(theta) + b * self.ridges[1].pdf(theta);
+        let [a, b] = lifted::<_, L, 2>(self.seen.shares);
+        let ridges = a * self.seen.ridges[0].pdf(theta) + b * self.seen.ridges[1].pdf(theta);
         let inv = L::c(0.5) / i.cos.sq().max(L::c(1e-12));
         let even = (L::one() - a - b) * L::c(1.0 / PI);
         wi.z.max(L::zero()) * ridges.mul_add(inv, even)
     }
 
     fn sample(&self, u: [S; 2]) -> V3<S> {
-        let [a, b] = self.shares;
+        let [a, b] = self.seen.shares;
         let (first, second) = (u[0].lt(a), u[0].lt(a + b));
         let choose = |x: S, y: S, z: S| S::select(first, x, S::select(second, y, z));
         let rest = (S::one() - a - b).max(S::c(1e-6));
         let tiny = S::c(1e-9);
         let v = choose(u[0] / a.max(tiny), (u[0] - a) / b.max(tiny), (u[0] - a - b) / rest);
         let v = v.clamp(S::zero(), S::one());
-        let theta = S::select(first, self.ridges[0].sample(v), self.ridges[1].sample(v));
+        let theta = S::select(first, self.seen.ridges[0].sample(v), self.seen.ridges[1].sample(v));
         let (ridge, even) = (around_thread(theta, u[1]), sampling::cosine_hemisphere([v, u[1]]));
         let pick = |ridge: S, even: S| S::select(second, ridge, even);
         V3::new(pick(ridge.x, even.x), pick(ridge.y, even.y), pick(ridge.z, even.z))

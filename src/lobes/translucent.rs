@@ -26,6 +26,7 @@ pub struct Translucent<S> {
 
 impl<S: Real> Lobe<S> for Translucent<S> {
     type Params = TranslucentParams;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
         Some(Limits { lowest: 1.0, highest: 1.0 })

@@ -22,6 +22,7 @@ pub struct Transparent<S> {
 
 impl<S: Real> Lobe<S> for Transparent<S> {
     type Params = TransparentParams;
+    type Aimed = Self;
 
     fn limits(_: &[SlotRange], _: (f64, f64)) -> Option<Limits> {
         Some(Limits { lowest: 1.0, highest: 1.0 })

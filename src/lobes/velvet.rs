@@ -76,6 +76,7 @@ impl<S: Real> Velvet<S> {
 
 impl<S: Real> Lobe<S> for Velvet<S> {
     type Params = VelvetParams;
+    type Aimed = Self;
 
     fn curve(values: &[Option<f32>]) -> Option<CurveSpec> {
         let spec = &VelvetParams::SPEC.params[1];

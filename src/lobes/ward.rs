@@ -163,6 +163,7 @@ impl<S: Real> Ward<S> {
 
 impl<S: Real> Lobe<S> for Ward<S> {
     type Params = WardParams;
+    type Aimed = Self;
 
     fn roughness(&self) -> S {
         (self.alpha[0] * self.alpha[1]).sqrt().sqrt()

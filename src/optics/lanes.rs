@@ -168,7 +168,10 @@ impl Real for f32 {
     }
     #[inline(always)]
     fn run<const N: usize>(table: &[f32], index: f32) -> [f32; N] {
-        table.get(elementary::index(index)..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; N])
+        // One comparison: an index is far from the largest number.
+        let start = elementary::index(index);
+        let run = table.get(start..start + N).and_then(|run| run.first_chunk());
+        run.copied().unwrap_or([0.0; N])
     }
     #[inline(always)]
     fn octaves<const OCTAVES: u32, const DIGITS: i32, const CELLS: usize, const WIDTH: usize>(

@@ -95,6 +95,13 @@ impl<S: Real> Facets<S> {
         }
     }
 
+    /// [`reach`](Self::reach) of the surface and of its [`proposal`](Self::proposal).
+    #[inline(always)]
+    pub fn reaches<L: Over<S>>(&self, w: V3<L>) -> [L; 2] {
+        let reach = self.reach(w);
+        [reach, if self.is_proposal() { reach } else { self.proposal().reach(w) }]
+    }
+
     /// A facet seen from `wo` (unit, z > 0) for two uniform numbers in [0, 1): any length. Follows the density of
     /// visible facets of [`proposal`](Self::proposal); spherical caps, Dupuy & Benyoub 2023, listing 3.
     #[inline(always)]
