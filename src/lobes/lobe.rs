@@ -84,6 +84,7 @@ macro_rules! keeps_seen {
 pub(super) use keeps_seen;
 
 /// Says that a BSDF keeps of a lobe what it keeps of the one in a field.
+#[cfg(feature = "microfacet")]
 macro_rules! keeps_that_of {
     ($Lobe:ident { $field:ident: $Seen:ident }) => {
         impl<S: $crate::optics::Real> $crate::lobes::Aimed<$Lobe<S>> for $Seen<S> {
@@ -106,6 +107,7 @@ macro_rules! keeps_that_of {
     };
 }
 
+#[cfg(feature = "microfacet")]
 pub(super) use keeps_that_of;
 
 /// What is kept of a lobe that is one of two things.
