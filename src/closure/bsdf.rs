@@ -290,7 +290,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
 
     #[inline(never)]
     fn sample_delta(&self, index: usize, l: Met<'_, 'm, S>) -> Option<Sample<S>> {
-        let (local, _) = l.whole().delta()?;
+        let (local, _) = l.delta()?;
         let wi = self.frames[l.place.frame as usize].to_world(local);
         if !is_unit(wi) {
             // Seen along no direction, it has none to send light to.
@@ -306,7 +306,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     fn crosses(&self, wi: V3<S>) -> bool {
         // By sign, whatever its length; one that is not finite has no sides.
         let i = self.ng.dot(wi) * self.side;
-        (i < S::zero()) & (i >= S::c(-f32::MAX as f64))
+        i < S::zero() && i.is_finite()
     }
 
     /// [`sample`](Self::sample) for as many `u` as `out` has room for, and as many `out` as there are `u`.

@@ -112,6 +112,11 @@ impl<'b, S: Scalar> Met<'b, '_, S> {
         self.flat.lobe.pdf(self.rest(), wi)
     }
 
+    /// See [`AnyLobe::delta`]; `None` for lobes of another class, without making them again.
+    pub fn delta(&self) -> Option<(V3<S>, Rgb<S>)> {
+        if self.place.delta { self.whole().delta() } else { None }
+    }
+
     pub fn relative_eta(&self, wi: V3<S>) -> S {
         self.whole().relative_eta(wi)
     }

@@ -79,7 +79,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// The direction delta lobe `index` scatters to, in world space; `None` for other lobes.
     pub(crate) fn lobe_delta_direction(&self, index: usize) -> Option<[S; 3]> {
         let l = self.lobe(index);
-        let (local, _) = if l.place.delta { l.whole().delta()? } else { return None };
+        let (local, _) = l.delta()?;
         let wi = self.lobe_frame(index).to_world(local);
         Some([wi.x, wi.y, wi.z])
     }
@@ -100,7 +100,7 @@ impl<'m, S: Scalar> Bsdf<'m, S> {
     /// direction); `None` for other lobes.
     pub(crate) fn lobe_delta(&self, index: usize, layered: bool) -> Option<Rgb<S>> {
         let l = self.lobe(index);
-        let (local, part) = if l.place.delta { l.whole().delta()? } else { return None };
+        let (local, part) = l.delta()?;
         let wi = self.lobe_frame(index).to_world(local);
         let mut scale = [S::one(); 3];
         if layered {
